@@ -1,0 +1,53 @@
+#pragma once
+
+/// The closest point on many manifolds, behind one interface.
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/manifold/manifold.h"
+
+namespace eigenpose {
+
+/// The closest point on one manifold.
+struct Closest {
+  std::size_t manifold = 0;   ///< index into the searched list
+  std::vector<double> q;      ///< m values, canonical
+  double distance = 0.0;      ///< Euclidean, to the *continuous* manifold
+};
+
+/// Nearest-manifold search. Built once over a list of manifolds of equal K (m may differ); const calls are
+/// thread-safe. Every implementation gives the answer of the exhaustive oracle, up to 1e-5 in distance.
+class ManifoldSearch {
+ public:
+  virtual ~ManifoldSearch() = default;
+
+  /// The closest points on up to `count` *different* manifolds, nearest first, leaving out those farther than
+  /// `bound`. Empty when none lies within it. @pre point.size() == K.
+  [[nodiscard]] virtual std::vector<Closest> nearest(
+      const Eigen::Ref<const Eigen::VectorXf>& point, std::size_t count = 1,
+      double bound = std::numeric_limits<double>::infinity()) const = 0;
+
+  [[nodiscard]] virtual std::string_view name() const = 0;
+  /// Bytes held beside the manifolds themselves.
+  [[nodiscard]] virtual std::size_t memory() const = 0;
+
+ protected:
+  ManifoldSearch() = default;
+  ManifoldSearch(const ManifoldSearch&) = default;
+  ManifoldSearch& operator=(const ManifoldSearch&) = default;
+};
+
+/// @param kind "tree" (default: exact box tree over the spline segments), "exhaustive" (the oracle), "flann"
+/// (exact single kd-tree over samples, then refinement), "slab" (Nene–Nayar).
+/// @param manifolds are kept by reference: they outlive the search.
+/// @throws std::invalid_argument for an unknown kind, an empty list or unequal K.
+std::unique_ptr<ManifoldSearch> make_search(std::string_view kind, std::span<const Manifold> manifolds);
+
+}  // namespace eigenpose

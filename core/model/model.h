@@ -1,0 +1,44 @@
+#pragma once
+
+/// The model: everything recognition needs, in one value and one file.
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/workspace.h"
+#include "core/image/normalization.h"
+#include "core/manifold/manifold.h"
+#include "core/subspace/eigenspace.h"
+
+namespace eigenpose {
+
+/// One learned object.
+struct ModelObject {
+  std::string name;
+  Workspace workspace;
+  Manifold manifold;                 ///< in the universal eigenspace
+  double rejection_distance = 0.0;   ///< a region farther than this is unknown
+  bool pose_observable = true;       ///< false where turning the object does not change its appearance
+  std::size_t views = 0;             ///< how many views it was learned from
+};
+
+/// Where a model comes from; shown by `eigenpose inspect`.
+struct Provenance {
+  std::string program_version;
+  std::string created;       ///< ISO 8601, UTC
+  std::string image_sets;    ///< folder learned from
+  std::string solver;
+  double energy = 0.0;       ///< share of the scatter that the eigenspace keeps
+};
+
+/// A learned model. Immutable once made: share it as std::shared_ptr<const Model>.
+struct Model {
+  NormalizationOptions normalization;
+  Eigenspace eigenspace;
+  std::vector<ModelObject> objects;
+  Provenance provenance;
+};
+
+}  // namespace eigenpose

@@ -1,0 +1,48 @@
+#pragma once
+
+/// From a frame to outcomes: regions → appearance → projection → nearest manifold → accept or reject.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/clock.h"
+#include "core/image/frame.h"
+#include "core/image/region.h"
+#include "core/model/model.h"
+#include "core/recognition/outcome.h"
+
+namespace eigenpose {
+
+/// Where the time of one recognition went.
+struct RecognitionTimes {
+  Duration segment{};
+  Duration normalize{};
+  Duration project{};
+  Duration search{};
+  Duration total{};
+};
+
+/// Recognises objects with one model. Holds scratch memory: one thread at a time; make one per thread, they share
+/// the model.
+class Recognizer {
+ public:
+  explicit Recognizer(std::shared_ptr<const Model> model);
+  ~Recognizer();
+  Recognizer(Recognizer&&) noexcept;
+  Recognizer& operator=(Recognizer&&) noexcept;
+
+  [[nodiscard]] const Model& model() const;
+
+  /// Every region of the picture, left to right, and what it is. The span is valid until the next call.
+  /// An empty table gives no outcome. @throws std::invalid_argument for a picture whose type or size the model
+  /// cannot take.
+  std::span<const Outcome> recognize(const cv::Mat& image, RecognitionTimes* times = nullptr);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace eigenpose

@@ -1,0 +1,32 @@
+#pragma once
+
+/// What Eigenpose needs of a light source, no more.
+
+#include <string>
+
+#include "core/base/clock.h"
+
+namespace eigenpose {
+
+struct LampInfo {
+  std::string name;   ///< the configuration's name for it
+  std::string model;  ///< "Enttec DMX USB Pro", …
+};
+
+/// A lamp with one level. Lives on one thread. Goes dark when destroyed.
+class Lamp {
+ public:
+  virtual ~Lamp() = default;
+  [[nodiscard]] virtual const LampInfo& info() const = 0;
+  /// @param level 0 (dark) … 1 (full). @throws std::out_of_range; DeviceError and its kinds.
+  virtual void set_level(double level, TimePoint deadline) = 0;
+  /// The level last set.
+  [[nodiscard]] virtual double level() const = 0;
+
+ protected:
+  Lamp() = default;
+  Lamp(const Lamp&) = default;
+  Lamp& operator=(const Lamp&) = default;
+};
+
+}  // namespace eigenpose
