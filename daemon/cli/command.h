@@ -1,0 +1,39 @@
+#pragma once
+
+/// How a command hangs on the program `eigenpose`.
+///
+/// A command is one file `<command>_command.cpp` with one function `add_<command>_command`, entered in the
+/// table of main.cpp. The function adds a subcommand with its options and a help text with examples, and has
+/// the subcommand's callback set `CommandLine::action`. The action runs after the whole line has been
+/// understood.
+
+#include <functional>
+#include <stop_token>
+
+namespace CLI {
+class App;
+}
+
+namespace eigenpose::cli {
+
+/// What the program returns to the shell.
+enum ExitCode : int {
+  exit_done = 0,           ///< all went well
+  exit_failed = 1,         ///< something a person can do something about; one line on stderr says what
+  exit_usage = 2,          ///< the line was not understood
+  exit_interrupted = 130,  ///< stopped by Ctrl-C or SIGTERM, everything left tidy
+};
+
+/// What the line asks for.
+struct CommandLine {
+  /// Does the work and returns the exit code. Failures leave as exceptions; main turns them into one line on
+  /// stderr.
+  std::function<int()> action;
+  /// Requested by Ctrl-C and SIGTERM. Long work looks at it; a second Ctrl-C ends the program at once.
+  std::stop_token stop;
+};
+
+/// A row of the table in main.cpp.
+using AddCommand = void (*)(CLI::App& app, CommandLine& line);
+
+}  // namespace eigenpose::cli

@@ -1,0 +1,124 @@
+/// The program `eigenpose`: reads the line, runs one command, turns failures into one clear line on stderr.
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <pthread.h>
+#include <unistd.h>
+
+#include "core/base/error.h"
+#include "daemon/cli/command.h"
+
+namespace eigenpose::cli {
+namespace {
+
+/// The commands, in the order `--help` shows them.
+const std::vector<AddCommand> commands = {
+};
+
+constexpr const char* about =
+    "Eigenpose learns objects from views taken all around them, and says which object stands before a camera "
+    "and how "
+    "it is turned.";
+
+constexpr const char* examples = R"(
+Start here:
+  eigenpose import coil FOLDER --to SETS --angle index:5   turn photographs into image sets
+  eigenpose learn SETS --to lab.model                      learn them
+  eigenpose recognize photo.png --model lab.model          say what is in a picture
+  eigenpose evaluate SETS --learn-every 2                  measure how well that works
+
+'eigenpose COMMAND --help' explains one command, with examples.
+Exit code: 0 done, 1 failed (one line on stderr says why), 2 line not understood, 130 interrupted.)";
+
+/// Waits for SIGINT and SIGTERM on a thread of its own. The first asks for a stop, the second ends the
+/// program.
+class SignalWatch {
+ public:
+  SignalWatch() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    // Before any other thread exists, so that all of them inherit the mask.
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    watcher_ = std::thread([this] {
+      for (int count = 0;; ++count) {
+        int signal = 0;
+        if (sigwait(&signals_, &signal) != 0) continue;
+        if (ending_) return;
+        if (count > 0) _exit(exit_interrupted);
+        source_.request_stop();
+      }
+    });
+  }
+  SignalWatch(const SignalWatch&) = delete;
+  SignalWatch& operator=(const SignalWatch&) = delete;
+  ~SignalWatch() {
+    ending_ = true;
+    pthread_kill(watcher_.native_handle(), SIGTERM);
+    watcher_.join();
+  }
+  [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
+
+ private:
+  sigset_t signals_{};
+  std::stop_source source_;
+  std::atomic<bool> ending_{false};
+  std::thread watcher_;
+};
+
+/// The one place where exceptions become words.
+int complain(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const Interrupted& interrupted) {
+    std::fprintf(stderr, "eigenpose: %s\n", interrupted.what());
+    return exit_interrupted;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "eigenpose: out of memory; fewer views, a smaller --size or --grey need less\n");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "eigenpose: %s\n", error.what());
+  }
+  return exit_failed;
+}
+
+int run(int argc, char** argv) {
+  SignalWatch signals;
+  CommandLine line;
+  line.stop = signals.token();
+
+  CLI::App app(about, "eigenpose");
+  app.set_version_flag("--version", std::string("eigenpose ") + EIGENPOSE_VERSION);
+  app.footer(examples);
+  app.require_subcommand(1);
+  for (const AddCommand add : commands)
+    add(app, line);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::fprintf(stderr, "eigenpose: %s; 'eigenpose --help' and 'eigenpose COMMAND --help' explain\n",
+                 error.what());
+    return exit_usage;
+  }
+  try {
+    return line.action();
+  } catch (...) {
+    return complain(std::current_exception());
+  }
+}
+
+}  // namespace
+}  // namespace eigenpose::cli
+
+int main(int argc, char** argv) {
+  return eigenpose::cli::run(argc, argv);
+}
