@@ -21,8 +21,8 @@ namespace eigenpose {
 /// What the axis is. `dof` carries name, unit, range and whether it is periodic.
 struct AxisInfo {
   Dof dof;
-  std::string model;            ///< "Oriental Motor AZ", "Thorlabs APT", …
-  double resolution = 0.0;      ///< smallest step, in the unit
+  std::string model;               ///< "Oriental Motor AZ", "Thorlabs APT", …
+  double resolution = 0.0;         ///< smallest step, in the unit
   double arrival_tolerance = 0.0;  ///< |position read back − target| at which a move has arrived, in the unit
 };
 
@@ -30,15 +30,16 @@ struct AxisInfo {
 struct AxisState {
   double position = 0.0;  ///< read back from the drive, in the unit, canonical
   bool moving = false;
-  bool homed = false;     ///< position is trustworthy
+  bool homed = false;                ///< position is trustworthy
   std::optional<std::string> alarm;  ///< in words, when the drive raises one
 };
 
 /// One motorised DOF. Lives on one thread, except `stop_motion`, which any thread may call at any time.
 ///
-/// Every call that moves: refuses a target outside the range (std::out_of_range) before anything moves; returns only
-/// after the position *read back* is within the arrival tolerance and the drive reports standstill; and on every other
-/// way out (deadline, stop request, alarm, lost device) has told the drive to stop, as far as it can be reached.
+/// Every call that moves: refuses a target outside the range (std::out_of_range) before anything moves;
+/// returns only after the position *read back* is within the arrival tolerance and the drive reports
+/// standstill; and on every other way out (deadline, stop request, alarm, lost device) has told the drive to
+/// stop, as far as it can be reached.
 class Axis {
  public:
   virtual ~Axis() = default;
@@ -52,12 +53,12 @@ class Axis {
   virtual void home(TimePoint deadline, std::stop_token stop) = 0;
 
   /// Moves to `position` (absolute, in the unit) and waits for arrival.
-  /// @return the position read back. @throws std::out_of_range; DeviceError (not homed, alarm, arrived elsewhere),
-  /// DeviceTimeout, DeviceLost; Interrupted.
+  /// @return the position read back. @throws std::out_of_range; DeviceError (not homed, alarm, arrived
+  /// elsewhere), DeviceTimeout, DeviceLost; Interrupted.
   virtual double move_to(double position, TimePoint deadline, std::stop_token stop) = 0;
 
-  /// Tells the drive to stop now, and makes a `move_to` or `home` under way on another thread end with Interrupted.
-  /// Thread-safe, idempotent. @throws DeviceError when the drive cannot be told.
+  /// Tells the drive to stop now, and makes a `move_to` or `home` under way on another thread end with
+  /// Interrupted. Thread-safe, idempotent. @throws DeviceError when the drive cannot be told.
   virtual void stop_motion() = 0;
 
  protected:

@@ -27,10 +27,10 @@ struct CameraInfo {
 
 /// Counts since the camera was opened.
 struct CameraStatistics {
-  std::uint64_t frames_taken = 0;      ///< handed out
-  std::uint64_t frames_dropped = 0;    ///< taken by the device, never handed out: a newer one was there
-  std::uint64_t frames_damaged = 0;    ///< marked as an error by the device, never handed out
-  std::uint64_t times_lost = 0;        ///< how often the device went away
+  std::uint64_t frames_taken = 0;    ///< handed out
+  std::uint64_t frames_dropped = 0;  ///< taken by the device, never handed out: a newer one was there
+  std::uint64_t frames_damaged = 0;  ///< marked as an error by the device, never handed out
+  std::uint64_t times_lost = 0;      ///< how often the device went away
 };
 
 /// A camera. Lives on one thread, except `statistics`, which any thread may call.

@@ -34,8 +34,12 @@ class Angle {
   double radians_ = 0.0;
 };
 
-constexpr Angle degrees(double value) { return Angle::from_degrees(value); }
-constexpr Angle radians(double value) { return Angle::from_radians(value); }
+constexpr Angle degrees(double value) {
+  return Angle::from_degrees(value);
+}
+constexpr Angle radians(double value) {
+  return Angle::from_radians(value);
+}
 
 /// `value` moved by whole periods into [lower, lower + period). @pre period > 0.
 inline double wrap(double value, double lower, double period) {

@@ -7,9 +7,9 @@
 
 namespace eigenpose {
 
-/// A file under construction beside its target: "TARGET.part-PID". `commit` flushes it to the disk and renames it
-/// over the target; without `commit` the destructor removes it and the target stays as it was.
-/// One thread at a time.
+/// A file under construction beside its target: "TARGET.part-PID". `commit` flushes it to the disk and
+/// renames it over the target; without `commit` the destructor removes it and the target stays as it was. One
+/// thread at a time.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);

@@ -7,7 +7,9 @@
 
 namespace eigenpose {
 
-double Dof::canonical(double value) const { return periodic ? wrap(value, lower, period()) : value; }
+double Dof::canonical(double value) const {
+  return periodic ? wrap(value, lower, period()) : value;
+}
 
 double Dof::difference(double a, double b) const {
   return periodic ? circular_difference(a, b, period()) : a - b;
@@ -21,8 +23,9 @@ Workspace::Workspace(std::vector<Dof> dofs) : dofs_(std::move(dofs)) {
     if (!names.insert(dof.name).second)
       throw std::invalid_argument("two degrees of freedom are named \"" + dof.name + "\"");
     if (!(dof.lower < dof.upper))
-      throw std::invalid_argument("degree of freedom \"" + dof.name + "\": lower " + std::to_string(dof.lower) +
-                                  " is not below upper " + std::to_string(dof.upper));
+      throw std::invalid_argument("degree of freedom \"" + dof.name + "\": lower " +
+                                  std::to_string(dof.lower) + " is not below upper " +
+                                  std::to_string(dof.upper));
   }
 }
 
@@ -35,6 +38,8 @@ std::vector<double> Workspace::canonical(std::span<const double> q) const {
   return result;
 }
 
-Workspace turntable_workspace() { return Workspace({Dof{"table", "deg", 0.0, 360.0, true}}); }
+Workspace turntable_workspace() {
+  return Workspace({Dof{"table", "deg", 0.0, 360.0, true}});
+}
 
 }  // namespace eigenpose

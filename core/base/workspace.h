@@ -1,6 +1,7 @@
 #pragma once
 
-/// The visual workspace: the degrees of freedom that change what the camera sees (eq. 1 of Nayar, Murase, Nene).
+/// The visual workspace: the degrees of freedom that change what the camera sees (eq. 1 of Nayar, Murase,
+/// Nene).
 
 #include <cstddef>
 #include <span>
@@ -11,11 +12,11 @@ namespace eigenpose {
 
 /// One degree of freedom (DOF): a named variable with unit and range.
 struct Dof {
-  std::string name;       ///< "table", "light_azimuth", "x"
-  std::string unit;       ///< "deg", "mm"
-  double lower = 0.0;     ///< smallest value, in `unit`
-  double upper = 360.0;   ///< largest value; for a periodic DOF lower + period, which equals `lower`
-  bool periodic = true;   ///< closes on itself
+  std::string name;      ///< "table", "light_azimuth", "x"
+  std::string unit;      ///< "deg", "mm"
+  double lower = 0.0;    ///< smallest value, in `unit`
+  double upper = 360.0;  ///< largest value; for a periodic DOF lower + period, which equals `lower`
+  bool periodic = true;  ///< closes on itself
 
   [[nodiscard]] double period() const { return upper - lower; }
   /// `value` moved into [lower, upper) if periodic; unchanged otherwise.

@@ -3,6 +3,7 @@
 /// One picture from a camera, with the facts that make it evidence.
 
 #include <cstdint>
+
 #include <opencv2/core.hpp>
 
 #include "core/base/clock.h"
@@ -15,7 +16,8 @@ struct Frame {
   cv::Mat image;
   /// No photon of this picture is older than this. Compare with the time an axis settled.
   TimePoint exposure_start{};
-  /// Counts every picture the camera took, also those nobody fetched; never goes back while the camera is open.
+  /// Counts every picture the camera took, also those nobody fetched; never goes back while the camera is
+  /// open.
   std::uint64_t sequence = 0;
 };
 

@@ -6,15 +6,16 @@
 ///     SETS/mug/views.jsonl   one JSON object a line: {"file": "000000.png", "q": [0.0], ...}
 ///     SETS/mug/000000.png    the views
 ///
-/// `views.jsonl` is a journal: a line is appended only after its image is safely on disk, so that an interrupted
-/// acquisition keeps everything it has taken and can be continued.
+/// `views.jsonl` is a journal: a line is appended only after its image is safely on disk, so that an
+/// interrupted acquisition keeps everything it has taken and can be continued.
 
 #include <cstddef>
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
-#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+#include <opencv2/core.hpp>
 
 #include "core/base/workspace.h"
 
@@ -29,7 +30,8 @@ struct ViewRecord {
 /// An image set as read from disk: the index, not the pixels. Value type.
 class ImageSet {
  public:
-  /// Reads and checks the index. @throws FileError (missing, malformed, a `q` of the wrong length, a file twice).
+  /// Reads and checks the index. @throws FileError (missing, malformed, a `q` of the wrong length, a file
+  /// twice).
   static ImageSet open(const std::filesystem::path& folder);
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
@@ -58,10 +60,12 @@ std::vector<ImageSet> open_image_sets(const std::filesystem::path& root);
 /// Writes an image set view by view. One thread at a time.
 class ImageSetWriter {
  public:
-  /// Makes `root/object` (and continues an incomplete set of the same object and workspace that stands there).
+  /// Makes `root/object` (and continues an incomplete set of the same object and workspace that stands
+  /// there).
   /// @param source a JSON object that says where the views come from; kept in set.json.
   /// @throws FileError when a complete set stands there already or the folder cannot be written;
-  /// std::invalid_argument for an object name that is not 1 to 64 of [A-Za-z0-9_.-] starting with a letter or digit.
+  /// std::invalid_argument for an object name that is not 1 to 64 of [A-Za-z0-9_.-] starting with a letter or
+  /// digit.
   ImageSetWriter(const std::filesystem::path& root, const std::string& object, Workspace workspace,
                  const nlohmann::json& source);
   ImageSetWriter(const ImageSetWriter&) = delete;
@@ -71,7 +75,8 @@ class ImageSetWriter {
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   /// Views that stood there when it was opened.
   [[nodiscard]] const std::vector<ViewRecord>& views() const { return views_; }
-  /// Image to disk, then its journal line. @throws FileError (disk full, …); then the set is as it was before.
+  /// Image to disk, then its journal line. @throws FileError (disk full, …); then the set is as it was
+  /// before.
   void add(const cv::Mat& image, std::vector<double> q);
   /// Marks the set complete.
   void finish();

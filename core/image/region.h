@@ -8,9 +8,9 @@ namespace eigenpose {
 
 /// One region of a frame, in pixel coordinates of that frame.
 struct Region {
-  cv::Rect box;                  ///< tight bounding box
-  int area = 0;                  ///< foreground pixels in it
-  bool touches_border = false;   ///< part of it may be outside the picture
+  cv::Rect box;                 ///< tight bounding box
+  int area = 0;                 ///< foreground pixels in it
+  bool touches_border = false;  ///< part of it may be outside the picture
 };
 
 }  // namespace eigenpose

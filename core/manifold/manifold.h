@@ -5,17 +5,19 @@
 /// Data stand at the *centres* of the basis functions (for degree 2: f_i = ⅛c_{i−1} + ¾c_i + ⅛c_{i+1}), where
 /// interpolation is well conditioned for any number of samples, periodic or open. Never at the knots.
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "core/base/workspace.h"
 
 namespace eigenpose {
 
-/// The sample positions along one DOF, ascending, in the DOF's unit; strictly increasing, inside [lower, upper)
-/// for a periodic DOF. A periodic axis needs ≥ 3 samples, an open one ≥ 2; an axis with 1 sample is constant.
+/// The sample positions along one DOF, ascending, in the DOF's unit; strictly increasing, inside [lower,
+/// upper) for a periodic DOF. A periodic axis needs ≥ 3 samples, an open one ≥ 2; an axis with 1 sample is
+/// constant.
 struct SampleAxis {
   Dof dof;
   std::vector<double> samples;
@@ -38,8 +40,8 @@ class Manifold {
   /// Rebuilds a manifold from what a model file stores.
   static Manifold from_coefficients(std::vector<SampleAxis> axes, Eigen::MatrixXd coefficients, int degree);
 
-  [[nodiscard]] std::size_t dofs() const { return axes_.size(); }                    ///< m
-  [[nodiscard]] Eigen::Index dimensions() const { return coefficients_.rows(); }     ///< K
+  [[nodiscard]] std::size_t dofs() const { return axes_.size(); }                 ///< m
+  [[nodiscard]] Eigen::Index dimensions() const { return coefficients_.rows(); }  ///< K
   [[nodiscard]] std::span<const SampleAxis> axes() const { return axes_; }
   [[nodiscard]] int degree() const { return degree_; }
   /// K × number of coefficients, same order as `points`.

@@ -2,7 +2,6 @@
 
 /// The closest point on many manifolds, behind one interface.
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -11,15 +10,17 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/manifold/manifold.h"
 
 namespace eigenpose {
 
 /// The closest point on one manifold.
 struct Closest {
-  std::size_t manifold = 0;   ///< index into the searched list
-  std::vector<double> q;      ///< m values, canonical
-  double distance = 0.0;      ///< Euclidean, to the *continuous* manifold
+  std::size_t manifold = 0;  ///< index into the searched list
+  std::vector<double> q;     ///< m values, canonical
+  double distance = 0.0;     ///< Euclidean, to the *continuous* manifold
 };
 
 /// Nearest-manifold search. Built once over a list of manifolds of equal K (m may differ); const calls are

@@ -18,19 +18,19 @@ namespace eigenpose {
 struct ModelObject {
   std::string name;
   Workspace workspace;
-  Manifold manifold;                 ///< in the universal eigenspace
-  double rejection_distance = 0.0;   ///< a region farther than this is unknown
-  bool pose_observable = true;       ///< false where turning the object does not change its appearance
-  std::size_t views = 0;             ///< how many views it was learned from
+  Manifold manifold;                ///< in the universal eigenspace
+  double rejection_distance = 0.0;  ///< a region farther than this is unknown
+  bool pose_observable = true;      ///< false where turning the object does not change its appearance
+  std::size_t views = 0;            ///< how many views it was learned from
 };
 
 /// Where a model comes from; shown by `eigenpose inspect`.
 struct Provenance {
   std::string program_version;
-  std::string created;       ///< ISO 8601, UTC
-  std::string image_sets;    ///< folder learned from
+  std::string created;     ///< ISO 8601, UTC
+  std::string image_sets;  ///< folder learned from
   std::string solver;
-  double energy = 0.0;       ///< share of the scatter that the eigenspace keeps
+  double energy = 0.0;  ///< share of the scatter that the eigenspace keeps
 };
 
 /// A learned model. Immutable once made: share it as std::shared_ptr<const Model>.

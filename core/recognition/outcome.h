@@ -2,11 +2,12 @@
 
 /// What recognition says of one region of a picture.
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <opencv2/core.hpp>
 
 namespace eigenpose {
 
@@ -25,14 +26,14 @@ std::string_view verdict_name(Verdict verdict);
 /// One object and pose that fits a region.
 struct Hypothesis {
   std::string object;
-  std::vector<double> q;     ///< pose: m values in the units of the object's workspace, canonical
-  double distance = 0.0;     ///< in the eigenspace, between unit-energy appearances; 0…2
+  std::vector<double> q;  ///< pose: m values in the units of the object's workspace, canonical
+  double distance = 0.0;  ///< in the eigenspace, between unit-energy appearances; 0…2
 };
 
 /// The answer for one region.
 struct Outcome {
   Verdict verdict = Verdict::unknown;
-  cv::Rect box;                          ///< in the frame, pixels
+  cv::Rect box;  ///< in the frame, pixels
   /// The best fit. Present also when the verdict is `unknown` or `ambiguous`, then as information only.
   std::optional<Hypothesis> best;
   /// The best fit among the *other* objects, when one lies within reach of the search.
@@ -41,8 +42,8 @@ struct Outcome {
   std::optional<Hypothesis> other_pose;
   /// 1-sigma uncertainty of each value of `best->q`, in its unit; infinite where the pose cannot be seen.
   std::vector<double> q_sigma;
-  double rejection_distance = 0.0;       ///< of the best object; `best->distance` is compared with it
-  double confidence = 0.0;               ///< 0…1
+  double rejection_distance = 0.0;  ///< of the best object; `best->distance` is compared with it
+  double confidence = 0.0;          ///< 0…1
 };
 
 }  // namespace eigenpose

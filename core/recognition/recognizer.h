@@ -24,8 +24,8 @@ struct RecognitionTimes {
   Duration total{};
 };
 
-/// Recognises objects with one model. Holds scratch memory: one thread at a time; make one per thread, they share
-/// the model.
+/// Recognises objects with one model. Holds scratch memory: one thread at a time; make one per thread, they
+/// share the model.
 class Recognizer {
  public:
   explicit Recognizer(std::shared_ptr<const Model> model);
@@ -36,8 +36,8 @@ class Recognizer {
   [[nodiscard]] const Model& model() const;
 
   /// Every region of the picture, left to right, and what it is. The span is valid until the next call.
-  /// An empty table gives no outcome. @throws std::invalid_argument for a picture whose type or size the model
-  /// cannot take.
+  /// An empty table gives no outcome. @throws std::invalid_argument for a picture whose type or size the
+  /// model cannot take.
   std::span<const Outcome> recognize(const cv::Mat& image, RecognitionTimes* times = nullptr);
 
  private:

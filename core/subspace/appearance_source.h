@@ -2,9 +2,10 @@
 
 /// Where the solvers get their appearances from: memory, or files larger than memory.
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+
+#include <Eigen/Core>
 
 namespace eigenpose {
 

@@ -20,7 +20,8 @@ struct SolverOptions {
   std::string solver = "auto";
   /// K. At most M−1; fewer are returned where the appearances span fewer dimensions (the report says so).
   std::size_t components = 20;
-  /// If set (0…1], K is the smallest number that keeps this share of the scatter, and `components` its upper limit.
+  /// If set (0…1], K is the smallest number that keeps this share of the scatter, and `components` its upper
+  /// limit.
   std::optional<double> energy;
   /// Threads for the products; 0 means all cores. The result does not depend on it.
   unsigned threads = 0;
@@ -29,22 +30,23 @@ struct SolverOptions {
 };
 
 struct SolverReport {
-  std::string solver;             ///< the one that ran
-  std::size_t components = 0;     ///< K reached
-  double energy = 0.0;            ///< share of the scatter kept
+  std::string solver;          ///< the one that ran
+  std::size_t components = 0;  ///< K reached
+  double energy = 0.0;         ///< share of the scatter kept
   /// Largest ‖Q e − λ e‖ / (λ_k − λ_{k+1}): bounds the sine of the angle between found and true eigenvector.
   double residual_over_gap = 0.0;
-  bool exact_integers = false;    ///< the Gram matrix was computed in integers
+  bool exact_integers = false;  ///< the Gram matrix was computed in integers
   Duration gram_time{};
   Duration solve_time{};
   Duration back_projection_time{};
-  std::string note;               ///< anything a person should know, e.g. a smaller rank than asked for
+  std::string note;  ///< anything a person should know, e.g. a smaller rank than asked for
 };
 
 /// The eigenspace of all views of `source`.
-/// @throws std::invalid_argument (fewer than two views, unknown solver, no memory for the one named), Error when the
-/// result would be inaccurate, Interrupted.
-Eigenspace solve_eigenspace(const AppearanceSource& source, const SolverOptions& options, SolverReport* report = nullptr,
-                            const Progress& progress = {}, std::stop_token stop = {});
+/// @throws std::invalid_argument (fewer than two views, unknown solver, no memory for the one named), Error
+/// when the result would be inaccurate, Interrupted.
+Eigenspace solve_eigenspace(const AppearanceSource& source, const SolverOptions& options,
+                            SolverReport* report = nullptr, const Progress& progress = {},
+                            std::stop_token stop = {});
 
 }  // namespace eigenpose

@@ -1,0 +1,134 @@
+// Refuses an include that goes against the layers. The table below is the one place that says who may know
+// whom.
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path source_root = EIGENPOSE_SOURCE_DIR;
+
+/// Folder → folders whose headers it may include. Every folder may include its own.
+const std::map<std::string, std::set<std::string>> licences = {
+    {"core/base", {}},
+    {"core/image", {"core/base"}},
+    {"core/subspace", {"core/base"}},
+    {"core/manifold", {"core/base"}},
+    {"core/model", {"core/base", "core/image", "core/subspace", "core/manifold"}},
+    {"core/recognition", {"core/base", "core/image", "core/subspace", "core/manifold", "core/model"}},
+    {"drivers", {"core/base", "core/image"}},
+    {"drivers/v4l2", {"drivers", "core/base", "core/image"}},
+    {"drivers/modbus", {"drivers", "core/base"}},
+    {"drivers/usb", {"drivers", "core/base"}},
+    {"sim", {"drivers", "drivers/usb", "core/base", "core/image"}},
+    {"config", {"drivers", "drivers/v4l2", "drivers/modbus", "drivers/usb", "core/base"}},
+    {"daemon",
+     {"config", "sim", "drivers", "drivers/v4l2", "drivers/modbus", "drivers/usb", "core/base", "core/image",
+      "core/subspace", "core/manifold", "core/model", "core/recognition"}},
+};
+
+/// Outside headers that the library must not know: devices, sockets, the daemon's world.
+const std::regex foreign_to_core(
+    R"(^(sys/socket\.h|sys/un\.h|netinet/.*|linux/.*|modbus.*|libusb.*|boost/(asio|beast).*|systemd/.*|sqlite3\.h|toml.*|CLI/.*|spdlog/.*|embree.*)$)");
+
+/// The longest key of `licences` that is the file's folder or a folder above it; empty if none.
+std::string layer_of(const std::string& path) {
+  for (fs::path folder = fs::path(path).parent_path(); !folder.empty(); folder = folder.parent_path())
+    if (licences.count(folder.generic_string())) return folder.generic_string();
+  return {};
+}
+
+struct Include {
+  std::string file;
+  int line = 0;
+  std::string target;
+  bool quoted = false;
+};
+
+std::vector<Include> includes_below(const std::string& folder) {
+  static const std::regex pattern(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
+  std::vector<Include> result;
+  for (const auto& entry : fs::recursive_directory_iterator(source_root / folder)) {
+    const auto extension = entry.path().extension();
+    if (extension != ".h" && extension != ".cpp") continue;
+    std::ifstream in(entry.path());
+    std::string text;
+    for (int line = 1; std::getline(in, text); ++line) {
+      std::smatch match;
+      if (std::regex_search(text, match, pattern))
+        result.push_back(
+            {fs::relative(entry.path(), source_root).generic_string(), line, match[2], match[1] == "\""});
+    }
+  }
+  return result;
+}
+
+std::vector<Include> all_includes() {
+  std::vector<Include> result;
+  for (const char* folder : {"core", "drivers", "sim", "config", "daemon"}) {
+    auto part = includes_below(folder);
+    result.insert(result.end(), part.begin(), part.end());
+  }
+  return result;
+}
+
+std::string where(const Include& include) {
+  return include.file + ":" + std::to_string(include.line) + " includes " + include.target;
+}
+
+TEST(Layering, EveryIncludeOfOursIsLicensed) {
+  const auto includes = all_includes();
+  ASSERT_GT(includes.size(), 20U) << "the sources were not found below " << source_root;
+  for (const Include& include : includes) {
+    if (!include.quoted) continue;
+    const std::string from = layer_of(include.file);
+    const std::string to = layer_of(include.target);
+    ASSERT_FALSE(from.empty()) << include.file << " stands in no known layer: add it to the table";
+    EXPECT_FALSE(to.empty()) << where(include) << ", which is in no layer; write the path from the top level";
+    if (to.empty() || from == to) continue;
+    EXPECT_TRUE(licences.at(from).count(to)) << where(include) << ": " << from << " may not know " << to;
+  }
+}
+
+TEST(Layering, TheLibraryKnowsNoDeviceAndNoSocket) {
+  for (const Include& include : includes_below("core"))
+    EXPECT_FALSE(std::regex_match(include.target, foreign_to_core)) << where(include);
+}
+
+TEST(Layering, TheTableHasNoCircle) {
+  // Depth-first: a layer that reaches itself is a circle.
+  for (const auto& [start, unused] : licences) {
+    std::set<std::string> seen;
+    std::vector<std::string> open(licences.at(start).begin(), licences.at(start).end());
+    while (!open.empty()) {
+      const std::string layer = open.back();
+      open.pop_back();
+      EXPECT_NE(layer, start) << start << " reaches itself";
+      if (!seen.insert(layer).second) continue;
+      open.insert(open.end(), licences.at(layer).begin(), licences.at(layer).end());
+    }
+  }
+}
+
+TEST(Layering, OnlyTheDeviceTableNamesRealAndSimulatedDevicesSideBySide) {
+  std::map<std::string, std::set<std::string>> kinds;  // file of daemon → kinds of device it includes
+  for (const Include& include : includes_below("daemon")) {
+    const std::string layer = layer_of(include.target);
+    if (layer == "sim") kinds[include.file].insert("simulated");
+    if (layer.starts_with("drivers/")) kinds[include.file].insert("real");
+  }
+  for (const auto& [file, which] : kinds)
+    EXPECT_TRUE(which.size() < 2 || file == "daemon/devices.cpp") << file << " names both";
+}
+
+}  // namespace
