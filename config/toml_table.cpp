@@ -1,0 +1,243 @@
+#include "config/toml_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numeric>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include "core/base/error.h"
+
+namespace eigenpose {
+namespace {
+
+/// Levenshtein's distance: how many letters to change, add or drop.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+    }
+  }
+  return row.back();
+}
+
+/// The allowed key that was probably meant, or nothing. A wrong unit (settle_s for settle_ms) counts as near.
+std::optional<std::string> nearest(std::string_view key, const std::vector<std::string>& allowed) {
+  const auto stem = [](std::string_view text) { return text.substr(0, text.rfind('_')); };
+  std::optional<std::string> best;
+  std::size_t best_distance = 3;  // more than two letters off is another word
+  for (const std::string& candidate : allowed) {
+    const bool same_stem = key.find('_') != std::string_view::npos && stem(key) == stem(candidate);
+    const std::size_t distance = same_stem ? 1 : edit_distance(key, candidate);
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+[[noreturn]] void fail_at(const std::string& file, const toml::source_region& where,
+                          const std::string& what) {
+  throw ConfigError(fmt::format("{}:{}: {}", file, where.begin.line, what));
+}
+
+}  // namespace
+
+struct TomlTable::Impl {
+  std::shared_ptr<const toml::table> root;  ///< keeps the nodes alive
+  const toml::table* table = nullptr;
+  std::string file;
+  std::string name;  ///< "[camera]", "[[axis]]"; the file itself has none
+  std::vector<std::string> known;
+
+  const toml::node* find(std::string_view key) {
+    if (std::find(known.begin(), known.end(), key) == known.end()) known.emplace_back(key);
+    return table->get(key);
+  }
+  [[noreturn]] void fail(const toml::node& node, std::string_view key, const std::string& what) const {
+    const std::string in = name.empty() ? "" : " in " + name;
+    fail_at(file, node.source(), fmt::format("{}{}: {}", key, in, what));
+  }
+  [[nodiscard]] TomlTable child(const toml::table& node, std::string child_name) const {
+    auto impl = std::make_shared<Impl>();
+    impl->root = root;
+    impl->table = &node;
+    impl->file = file;
+    impl->name = std::move(child_name);
+    return TomlTable(std::move(impl));
+  }
+  [[noreturn]] void missing(std::string_view key) const {
+    fail_at(file, table->source(),
+            name.empty() ? fmt::format("{} is missing", key) : fmt::format("{} is missing in {}", key, name));
+  }
+};
+
+TomlTable::TomlTable(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+TomlTable TomlTable::read_file(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file))
+    throw ConfigError(file.string() + ": cannot be read: give the configuration with --config FILE");
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return parse(text.str(), file.string());
+}
+
+TomlTable TomlTable::parse(std::string_view text, const std::string& name) {
+  auto impl = std::make_shared<Impl>();
+  try {
+    impl->root = std::make_shared<const toml::table>(toml::parse(text));
+  } catch (const toml::parse_error& error) {
+    fail_at(name, error.source(), "not valid TOML: " + std::string(error.description()));
+  }
+  impl->table = impl->root.get();
+  impl->file = name;
+  return TomlTable(std::move(impl));
+}
+
+bool TomlTable::has(std::string_view key) const {
+  return impl_->find(key) != nullptr;
+}
+
+std::string TomlTable::text(std::string_view key, std::optional<std::string> fallback) const {
+  const toml::node* node = impl_->find(key);
+  if (node == nullptr) {
+    if (!fallback) impl_->missing(key);
+    return *fallback;
+  }
+  if (!node->is_string()) impl_->fail(*node, key, "a text in quotes is needed");
+  return node->as_string()->get();
+}
+
+bool TomlTable::flag(std::string_view key, std::optional<bool> fallback) const {
+  const toml::node* node = impl_->find(key);
+  if (node == nullptr) {
+    if (!fallback) impl_->missing(key);
+    return *fallback;
+  }
+  if (!node->is_boolean()) impl_->fail(*node, key, "true or false is needed");
+  return node->as_boolean()->get();
+}
+
+double TomlTable::number(std::string_view key, std::optional<double> fallback, double lower,
+                         double upper) const {
+  const toml::node* node = impl_->find(key);
+  if (node == nullptr) {
+    if (!fallback) impl_->missing(key);
+    return *fallback;
+  }
+  const std::optional<double> value = node->is_number() ? node->value<double>() : std::nullopt;
+  if (!value || !std::isfinite(*value))
+    impl_->fail(*node, key, fmt::format("a number from {} to {} is needed", lower, upper));
+  if (*value < lower || *value > upper)
+    impl_->fail(*node, key, fmt::format("{} is outside what is allowed: {} to {}", *value, lower, upper));
+  return *value;
+}
+
+std::int64_t TomlTable::integer(std::string_view key, std::optional<std::int64_t> fallback,
+                                std::int64_t lower, std::int64_t upper) const {
+  const toml::node* node = impl_->find(key);
+  if (node == nullptr) {
+    if (!fallback) impl_->missing(key);
+    return *fallback;
+  }
+  if (!node->is_integer())
+    impl_->fail(*node, key, fmt::format("a whole number from {} to {} is needed", lower, upper));
+  const std::int64_t value = node->as_integer()->get();
+  if (value < lower || value > upper)
+    impl_->fail(*node, key, fmt::format("{} is outside what is allowed: {} to {}", value, lower, upper));
+  return value;
+}
+
+std::string TomlTable::choice(std::string_view key, std::optional<std::string> fallback,
+                              std::initializer_list<std::string_view> allowed) const {
+  std::string value = text(key, std::move(fallback));
+  if (std::find(allowed.begin(), allowed.end(), value) == allowed.end())
+    fail(key, fmt::format("\"{}\" is not known; allowed: \"{}\"", value, fmt::join(allowed, "\", \"")));
+  return value;
+}
+
+std::vector<double> TomlTable::numbers(std::string_view key) const {
+  const toml::node* node = impl_->find(key);
+  std::vector<double> result;
+  if (node == nullptr) return result;
+  if (!node->is_array()) impl_->fail(*node, key, "a list of numbers is needed");
+  for (const toml::node& element : *node->as_array()) {
+    const std::optional<double> value = element.is_number() ? element.value<double>() : std::nullopt;
+    if (!value || !std::isfinite(*value)) impl_->fail(element, key, "a list of numbers is needed");
+    result.push_back(*value);
+  }
+  return result;
+}
+
+std::vector<std::string> TomlTable::texts(std::string_view key) const {
+  const toml::node* node = impl_->find(key);
+  std::vector<std::string> result;
+  if (node == nullptr) return result;
+  if (!node->is_array()) impl_->fail(*node, key, "a list of texts is needed");
+  for (const toml::node& element : *node->as_array()) {
+    if (!element.is_string()) impl_->fail(element, key, "a list of texts is needed");
+    result.push_back(element.as_string()->get());
+  }
+  return result;
+}
+
+std::vector<std::pair<std::string, std::int64_t>> TomlTable::integers(std::string_view key) const {
+  const toml::node* node = impl_->find(key);
+  std::vector<std::pair<std::string, std::int64_t>> result;
+  if (node == nullptr) return result;
+  if (!node->is_table()) impl_->fail(*node, key, "a table of whole numbers is needed");
+  for (const auto& [name, value] : *node->as_table()) {
+    if (!value.is_integer()) impl_->fail(value, name.str(), "a whole number is needed");
+    result.emplace_back(name.str(), value.as_integer()->get());
+  }
+  return result;
+}
+
+std::optional<TomlTable> TomlTable::table(std::string_view key) const {
+  const toml::node* node = impl_->find(key);
+  if (node == nullptr) return std::nullopt;
+  if (!node->is_table()) impl_->fail(*node, key, fmt::format("a table is needed: [{}]", key));
+  return impl_->child(*node->as_table(), fmt::format("[{}]", key));
+}
+
+std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
+  const toml::node* node = impl_->find(key);
+  std::vector<TomlTable> result;
+  if (node == nullptr) return result;
+  if (!node->is_array_of_tables())
+    impl_->fail(*node, key, fmt::format("a list of tables is needed: [[{}]]", key));
+  for (const toml::node& element : *node->as_array())
+    result.push_back(impl_->child(*element.as_table(), fmt::format("[[{}]]", key)));
+  return result;
+}
+
+void TomlTable::finish() const {
+  for (const auto& [key, value] : *impl_->table) {
+    if (std::find(impl_->known.begin(), impl_->known.end(), key.str()) != impl_->known.end()) continue;
+    const std::optional<std::string> meant = nearest(key.str(), impl_->known);
+    std::string what = fmt::format("unknown key \"{}\"", key.str());
+    if (!impl_->name.empty()) what += " in " + impl_->name;
+    if (meant) what += fmt::format(", did you mean \"{}\"?", *meant);
+    what += fmt::format("{} allowed: {}", meant ? "" : ";", fmt::join(impl_->known, ", "));
+    fail_at(impl_->file, key.source(), what);
+  }
+}
+
+void TomlTable::fail(std::string_view key, const std::string& what) const {
+  const toml::node* node = impl_->table->get(key);
+  impl_->fail(node != nullptr ? *node : *impl_->table, key, what);
+}
+
+}  // namespace eigenpose

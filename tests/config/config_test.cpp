@@ -1,0 +1,139 @@
+#include "config/config.h"
+
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+
+namespace eigenpose {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string axis = "[[axis]]\nname = \"table\"\ndriver = \"modbus\"\nendpoint = \"tcp://h:502\"\n";
+
+std::string refusal(const std::string& text) {
+  try {
+    (void)parse_config(text, "rig.toml");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Config, AnEmptyFileIsAWatchfulDaemonWithoutDevices) {
+  const Config config = parse_config("", "rig.toml");
+  EXPECT_FALSE(config.camera);
+  EXPECT_TRUE(config.axes.empty());
+  EXPECT_FALSE(config.sim);
+  EXPECT_EQ(config.control_socket(), "/run/eigenpose/control.sock");
+  EXPECT_EQ(config.model_file(), "/var/lib/eigenpose/model.h5");
+}
+
+TEST(Config, AnUnknownKeyIsRefusedWithFileLineAndWhatIsAllowed) {
+  EXPECT_THAT(refusal("[watch]\nenabled = true\ncolour = true\n"),
+              AllOf(StartsWith("rig.toml:3: "), HasSubstr("unknown key \"colour\" in [watch]"),
+                    HasSubstr("allowed: enabled, settle_ms, threshold")));
+}
+
+TEST(Config, AMisspelledKeyIsMetWithTheOneThatWasMeant) {
+  EXPECT_THAT(refusal("[learn]\ncomponets = 3\n"), HasSubstr("did you mean \"components\"?"));
+}
+
+TEST(Config, AWrongUnitIsRefusedWithTheRightOne) {
+  EXPECT_THAT(refusal("[watch]\nsettle_s = 1\n"),
+              AllOf(StartsWith("rig.toml:2: "), HasSubstr("did you mean \"settle_ms\"?")));
+  EXPECT_THAT(refusal(axis + "unit = \"rad\"\n"),
+              AllOf(StartsWith("rig.toml:5: "), HasSubstr("\"deg\", \"mm\"")));
+}
+
+TEST(Config, AValueOutOfRangeIsRefusedWithTheRange) {
+  EXPECT_THAT(refusal("[learn]\nsize = 4\n"), AllOf(StartsWith("rig.toml:2: "), HasSubstr("8 to 256")));
+  EXPECT_THAT(refusal("[learn]\nenergy = nan\n"), HasSubstr("0.01 to 1"));
+  EXPECT_THAT(refusal("[api]\nmax_connections = 0\n"), HasSubstr("1 to 1000"));
+  EXPECT_THAT(refusal(axis + "station = 248\n"), HasSubstr("1 to 247"));
+}
+
+TEST(Config, AValueOfAnotherTypeIsRefused) {
+  EXPECT_THAT(refusal("[learn]\nsize = \"big\"\n"),
+              AllOf(StartsWith("rig.toml:2: "), HasSubstr("whole number")));
+  EXPECT_THAT(refusal("[learn]\ncolor = 1\n"), HasSubstr("true or false"));
+  EXPECT_THAT(refusal("[daemon]\nlog_level = 3\n"), HasSubstr("text in quotes"));
+  EXPECT_THAT(refusal("daemon = 3\n"), HasSubstr("[daemon]"));
+}
+
+TEST(Config, WhatIsNotTomlIsRefusedWithItsLine) {
+  EXPECT_THAT(refusal("[daemon]\nruntime_dir = \n"), StartsWith("rig.toml:2: not valid TOML"));
+}
+
+TEST(Config, AMissingFileIsRefusedByName) {
+  try {
+    (void)read_config("/nonexistent/rig.toml");
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("/nonexistent/rig.toml"));
+  }
+}
+
+TEST(Config, AnAxisThatIsNotPeriodicGivesItsRange) {
+  EXPECT_THAT(refusal(axis + "periodic = false\n"), HasSubstr("lower is missing in [[axis]]"));
+  EXPECT_THAT(refusal(axis + "unit = \"mm\"\nlower = 5\nupper = 5\n"), HasSubstr("not above lower"));
+  EXPECT_THAT(refusal(axis + "upper = 180.0\n"), HasSubstr("spans 360 deg"));
+  EXPECT_EQ(refusal(axis + "unit = \"mm\"\nlower = 0\nupper = 5\n"), "accepted");
+}
+
+TEST(Config, TwoAxesOfOneNameAreRefused) {
+  EXPECT_THAT(refusal(axis + axis),
+              AllOf(StartsWith("rig.toml:6: "), HasSubstr("\"table\" is there already")));
+}
+
+TEST(Config, AnEndpointThatIsNotUnderstoodIsRefused) {
+  EXPECT_THAT(refusal("[[axis]]\nname = \"t\"\ndriver = \"modbus\"\nendpoint = \"10.0.0.1\"\n"),
+              AllOf(StartsWith("rig.toml:4: "), HasSubstr("tcp://HOST:PORT")));
+}
+
+TEST(Config, APlanNamesAxesThatExistAndPositionsTheyReach) {
+  const std::string plan = axis + "[[plan]]\nname = \"p\"\n[[plan.axis]]\n";
+  EXPECT_THAT(refusal(plan + "axis = \"slide\"\nat = [0]\n"),
+              AllOf(StartsWith("rig.toml:8: "), HasSubstr("slide")));
+  EXPECT_THAT(refusal(plan + "axis = \"table\"\nat = [400]\n"), HasSubstr("allowed: 0 to 360"));
+  EXPECT_THAT(refusal(plan + "axis = \"table\"\n"), HasSubstr("either at"));
+  EXPECT_THAT(refusal(plan + "axis = \"table\"\nfrom = 0\nto = 360\ncount = 36\nat = [0]\n"),
+              HasSubstr("either at"));
+  const Config config = parse_config(plan + "axis = \"table\"\nfrom = 0\nto = 360\ncount = 36\n", "rig.toml");
+  ASSERT_EQ(config.plans.size(), 1U);
+  EXPECT_EQ(config.plans[0].size(), 36U);
+}
+
+TEST(Config, ASimulatedDeviceNeedsASimulatedLab) {
+  const std::string camera = "[camera]\ndriver = \"simulated\"\n";
+  EXPECT_THAT(refusal(camera), AllOf(StartsWith("rig.toml:2: "), HasSubstr("[sim]")));
+  EXPECT_EQ(refusal(camera + "[sim]\n"), "accepted");
+  EXPECT_THAT(refusal("[[axis]]\nname = \"t\"\ndriver = \"modbus\"\nendpoint = \"simulated\"\n"),
+              AllOf(StartsWith("rig.toml:4: "), HasSubstr("[sim]")));
+}
+
+TEST(Config, AKeyOfAnotherDriverIsRefused) {
+  EXPECT_THAT(refusal("[sim]\n[camera]\ndriver = \"simulated\"\ndevice = \"/dev/video0\"\n"),
+              AllOf(StartsWith("rig.toml:4: "), HasSubstr("unknown key \"device\"")));
+}
+
+TEST(Config, RelativePathsStartAtTheFilesFolder) {
+  const Config config =
+      parse_config("[daemon]\nruntime_dir = \"run\"\nstate_dir = \"/s\"\n", "/etc/lab/rig.toml");
+  EXPECT_EQ(config.daemon.runtime_dir, "/etc/lab/run");
+  EXPECT_EQ(config.daemon.state_dir, "/s");
+}
+
+TEST(Config, ASocketModeIsOctalAndLeavesTheOwnerIn) {
+  EXPECT_THAT(refusal("[api]\ncontrol_mode = \"rw\"\n"), HasSubstr("\"0600\" to \"0777\""));
+  EXPECT_THAT(refusal("[api]\ncontrol_mode = \"0066\"\n"), HasSubstr("owner"));
+  EXPECT_EQ(parse_config("[api]\ncontrol_mode = \"0600\"\n", "rig.toml").api.control_mode, 0600U);
+}
+
+}  // namespace
+}  // namespace eigenpose
