@@ -2,14 +2,16 @@
 
 /// An image set: all views of one object, on disk as ordinary files that a person can look through.
 ///
-///     SETS/mug/set.json      format, version, object, workspace, where it comes from, complete or not
-///     SETS/mug/views.jsonl   one JSON object a line: {"file": "000000.png", "q": [0.0], ...}
+///     SETS/mug/set.json      format, version, object, workspace, where it comes from, cropped, complete or
+///     not SETS/mug/views.jsonl   one JSON object a line: {"file": "000000.png", "q": [0.0], ...}
 ///     SETS/mug/000000.png    the views
 ///
 /// `views.jsonl` is a journal: a line is appended only after its image is safely on disk, so that an
-/// interrupted acquisition keeps everything it has taken and can be continued.
+/// interrupted acquisition keeps everything it has taken and can be continued. A last line without its end,
+/// left by a crash, does not count.
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -38,6 +40,8 @@ class ImageSet {
   [[nodiscard]] const std::string& object() const { return object_; }
   [[nodiscard]] const Workspace& workspace() const { return workspace_; }
   [[nodiscard]] const std::vector<ViewRecord>& views() const { return views_; }
+  /// The views are ready-cut pictures of the object alone: each is taken whole, not segmented again.
+  [[nodiscard]] bool cropped() const { return cropped_; }
   /// False while an acquisition is under way or was broken off.
   [[nodiscard]] bool complete() const { return complete_; }
 
@@ -50,12 +54,22 @@ class ImageSet {
   std::string object_;
   Workspace workspace_;
   std::vector<ViewRecord> views_;
+  bool cropped_ = false;
   bool complete_ = false;
 };
 
 /// Every image set below `root`, ordered by object name with numbers as numbers (obj9 before obj10).
 /// @throws FileError when there is none.
 std::vector<ImageSet> open_image_sets(const std::filesystem::path& root);
+
+/// What a writer promises and records, beside the views.
+struct ImageSetOptions {
+  /// See ImageSet::cropped.
+  bool cropped = false;
+  /// True: every view is on the disk when `add` returns (an acquisition takes seconds a view). False: only
+  /// when `finish` returns (a conversion can be started again).
+  bool sync_every_view = true;
+};
 
 /// Writes an image set view by view. One thread at a time.
 class ImageSetWriter {
@@ -67,7 +81,7 @@ class ImageSetWriter {
   /// std::invalid_argument for an object name that is not 1 to 64 of [A-Za-z0-9_.-] starting with a letter or
   /// digit.
   ImageSetWriter(const std::filesystem::path& root, const std::string& object, Workspace workspace,
-                 const nlohmann::json& source);
+                 const nlohmann::json& source, ImageSetOptions options = {});
   ImageSetWriter(const ImageSetWriter&) = delete;
   ImageSetWriter& operator=(const ImageSetWriter&) = delete;
   ~ImageSetWriter();
@@ -76,16 +90,23 @@ class ImageSetWriter {
   /// Views that stood there when it was opened.
   [[nodiscard]] const std::vector<ViewRecord>& views() const { return views_; }
   /// Image to disk, then its journal line. @throws FileError (disk full, …); then the set is as it was
-  /// before.
+  /// before; std::invalid_argument for a `q` of the wrong length or not finite, or a picture of another kind.
   void add(const cv::Mat& image, std::vector<double> q);
-  /// Marks the set complete.
+  /// The same with further facts about this view, kept in its journal line (a JSON object, e.g.
+  /// {"exposure_us": 5}).
+  void add(const cv::Mat& image, std::vector<double> q, const nlohmann::json& facts);
+  /// Marks the set complete. @throws FileError, also for a set without views.
   void finish();
 
  private:
   std::filesystem::path folder_;
   std::string object_;
   Workspace workspace_;
+  ImageSetOptions options_;
   std::vector<ViewRecord> views_;
+  std::string source_;          ///< JSON text
+  std::size_t next_file_ = 0;   ///< number of the next file name
+  std::uintmax_t journal_ = 0;  ///< bytes of views.jsonl that are good
 };
 
 }  // namespace eigenpose
