@@ -1,0 +1,258 @@
+#include "drivers/modbus/connection.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+#include <thread>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace eigenpose {
+
+namespace {
+
+constexpr std::uint8_t read_holding_registers = 0x03;
+constexpr std::uint8_t write_single_register = 0x06;
+constexpr std::uint8_t write_multiple_registers = 0x10;
+constexpr std::uint8_t exception_flag = 0x80;
+constexpr int mbap_length = 7;  ///< transaction, protocol, length, unit
+
+std::uint8_t high(int value) {
+  return static_cast<std::uint8_t>(value >> 8);
+}
+std::uint8_t low(int value) {
+  return static_cast<std::uint8_t>(value);
+}
+
+std::string exception_words(int code) {
+  static constexpr std::array<std::string_view, 12> words = {
+      "",
+      "illegal function: the device does not know this request",
+      "illegal address: the device has no such register; is the profile the right one?",
+      "illegal value: the device does not take this number",
+      "device failure: it cannot do that now",
+      "acknowledged, still working",
+      "busy",
+      "not acknowledged",
+      "memory parity error in the device",
+      "",
+      "gateway: no path to the device",
+      "gateway: the device behind it does not answer; check the unit number and the device's power"};
+  const std::string_view text =
+      code > 0 && code < static_cast<int>(words.size()) ? words[static_cast<std::size_t>(code)] : "";
+  return fmt::format("refused with exception {:#04x}{}{}", code, text.empty() ? "" : ": ", text);
+}
+
+void set_timeout(modbus_t* context, Duration timeout) {
+  const auto us =
+      std::max<std::int64_t>(1, std::chrono::duration_cast<std::chrono::microseconds>(timeout).count());
+  modbus_set_response_timeout(context, static_cast<std::uint32_t>(us / 1'000'000),
+                              static_cast<std::uint32_t>(us % 1'000'000));
+  // Zero: the whole answer, not each byte of it, has to come within the response timeout.
+  modbus_set_byte_timeout(context, 0, 0);
+}
+
+[[noreturn]] void fail_with_errno(int error) {
+  switch (error) {
+    case ETIMEDOUT:
+      throw ModbusFailure{ModbusFault::no_answer, "no answer"};
+    case EMBBADCRC:
+      throw ModbusFailure{ModbusFault::damaged, "answer with a wrong checksum"};
+    case EMBBADDATA:
+    case EMBBADEXC:
+    case EMBUNKEXC:
+    case EMBMDATA:
+      throw ModbusFailure{ModbusFault::damaged, "answer that is not Modbus"};
+    case EMBBADSLAVE:
+      throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
+    default:
+      throw ModbusFailure{ModbusFault::no_connection, modbus_strerror(error)};
+  }
+}
+
+std::string connect_advice(int error, bool serial) {
+  const std::string text = modbus_strerror(error);
+  if (serial) {
+    if (error == ENOENT) return text + ": is the adapter plugged in?";
+    if (error == EACCES) return text + ": may this user open it (group dialout)?";
+    return text;
+  }
+  if (error == ECONNREFUSED)
+    return text + ": nothing listens there; is the drive or its gateway on, and the port right?";
+  if (error == ETIMEDOUT || error == EINPROGRESS || error == EHOSTUNREACH || error == ENETUNREACH)
+    return text + ": is the cable in and the address right?";
+  return text;
+}
+
+modbus_t* new_context(const ModbusBusOptions& options) {
+  if (const auto* tcp = std::get_if<ModbusTcpEndpoint>(&options.endpoint))
+    return modbus_new_tcp_pi(tcp->host.c_str(), std::to_string(tcp->port).c_str());
+  const auto& rtu = std::get<ModbusRtuEndpoint>(options.endpoint);
+  return modbus_new_rtu(rtu.device.c_str(), rtu.baud, rtu.parity, 8, rtu.stop_bits);
+}
+
+Duration silent_interval_of(const ModbusRtuEndpoint& rtu) {
+  // 3.5 characters of 11 bits; above 19200 baud the protocol fixes 1.75 ms (Modbus over serial
+  // line, 2.5.1.1).
+  const auto characters = std::chrono::nanoseconds(static_cast<std::int64_t>(3.5 * 11.0 * 1e9 / rtu.baud));
+  const Duration protocol = rtu.baud > 19200 ? std::chrono::microseconds(1750) : Duration(characters);
+  return std::max(protocol, rtu.silent_interval);
+}
+
+}  // namespace
+
+ModbusBus::Connection::Connection(const ModbusBusOptions& options, Duration timeout)
+    : context_(new_context(options)), serial_(std::holds_alternative<ModbusRtuEndpoint>(options.endpoint)) {
+  if (context_ == nullptr) throw ModbusFailure{ModbusFault::no_connection, modbus_strerror(errno)};
+  modbus_set_error_recovery(context_, MODBUS_ERROR_RECOVERY_NONE);
+  set_timeout(context_, timeout);
+  if (modbus_connect(context_) < 0) {
+    const int error = errno;
+    modbus_free(context_);
+    throw ModbusFailure{ModbusFault::no_connection, connect_advice(error, serial_)};
+  }
+  if (serial_) {
+    silent_interval_ = silent_interval_of(std::get<ModbusRtuEndpoint>(options.endpoint));
+    // Two programs on one line would read each other's answers.
+    if (flock(modbus_get_socket(context_), LOCK_EX | LOCK_NB) != 0) {
+      modbus_close(context_);
+      modbus_free(context_);
+      throw ModbusFailure{ModbusFault::no_connection, "the port is in use by another program"};
+    }
+  }
+}
+
+ModbusBus::Connection::~Connection() {
+  modbus_close(context_);
+  modbus_free(context_);
+}
+
+void ModbusBus::Connection::drain(Duration silence, Duration limit) {
+  const auto end = std::chrono::steady_clock::now() + limit;
+  pollfd line{modbus_get_socket(context_), POLLIN, 0};
+  for (;;) {
+    const auto now = std::chrono::steady_clock::now();
+    const auto wait = std::min<Duration>(silence, end - now);
+    const auto wait_ms = std::chrono::ceil<std::chrono::milliseconds>(wait).count();
+    if (wait_ms <= 0 || poll(&line, 1, static_cast<int>(wait_ms)) <= 0) return;
+    std::array<std::uint8_t, 512> rubbish{};
+    const ssize_t got = ::read(line.fd, rubbish.data(), rubbish.size());
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return;
+  }
+}
+
+void ModbusBus::Connection::wait_for_silent_interval() {
+  std::this_thread::sleep_until(last_frame_ + silent_interval_);
+}
+
+void ModbusBus::Connection::send_tcp(int unit, std::span<const std::uint8_t> request) {
+  // libmodbus numbers only the requests it builds itself; sent raw they would all be number 0, and an answer
+  // that comes twice would pass for the next one.
+  ++transaction_;
+  std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH> frame{};
+  const int length = static_cast<int>(request.size()) + 1;
+  frame[0] = high(transaction_);
+  frame[1] = low(transaction_);
+  frame[4] = high(length);
+  frame[5] = low(length);
+  frame[6] = low(unit);
+  std::copy(request.begin(), request.end(), frame.begin() + mbap_length);
+  const std::size_t total = request.size() + mbap_length;
+  const ssize_t sent = send(modbus_get_socket(context_), frame.data(), total, MSG_NOSIGNAL);
+  if (sent < 0) fail_with_errno(errno);
+  if (static_cast<std::size_t>(sent) != total)
+    throw ModbusFailure{ModbusFault::no_connection, "the connection takes no more data"};
+}
+
+void ModbusBus::Connection::send_serial(int unit, std::span<const std::uint8_t> request) {
+  wait_for_silent_interval();
+  modbus_set_slave(context_, unit);
+  std::array<std::uint8_t, MODBUS_MAX_PDU_LENGTH + 1> raw{};
+  raw[0] = low(unit);
+  std::copy(request.begin(), request.end(), raw.begin() + 1);
+  if (modbus_send_raw_request(context_, raw.data(), static_cast<int>(request.size()) + 1) < 0)
+    fail_with_errno(errno);
+}
+
+std::span<const std::uint8_t> ModbusBus::Connection::exchange(int unit, std::span<const std::uint8_t> request,
+                                                              Duration timeout) {
+  modbus_flush(context_);
+  set_timeout(context_, timeout);
+  if (serial_)
+    send_serial(unit, request);
+  else
+    send_tcp(unit, request);
+
+  const int length = modbus_receive_confirmation(context_, answer_);
+  const int error = errno;
+  last_frame_ = std::chrono::steady_clock::now();
+  if (length < 0) fail_with_errno(error);
+  // libmodbus reports a serial answer with another unit in it as one of length 0.
+  if (length == 0) throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
+
+  const int before = serial_ ? 1 : mbap_length;
+  const int after = serial_ ? 2 : 0;
+  if (length < before + after + 2) throw ModbusFailure{ModbusFault::damaged, "answer too short"};
+  if (!serial_) {
+    if (answer_[0] != high(transaction_) || answer_[1] != low(transaction_))
+      throw ModbusFailure{ModbusFault::damaged, "answer to another request"};
+    if (answer_[2] != 0 || answer_[3] != 0)
+      throw ModbusFailure{ModbusFault::damaged, "answer that is not Modbus"};
+    if (answer_[4] * 256 + answer_[5] != length - (mbap_length - 1))
+      throw ModbusFailure{ModbusFault::damaged, "answer with a wrong length"};
+  }
+  if (answer_[before - 1] != low(unit)) throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
+
+  const std::span<const std::uint8_t> pdu(answer_ + before,
+                                          static_cast<std::size_t>(length - before - after));
+  if (pdu[0] == (request[0] | exception_flag)) {
+    const int code = pdu[1];
+    throw ModbusFailure{code == 5 || code == 6 ? ModbusFault::busy : ModbusFault::refused,
+                        exception_words(code)};
+  }
+  if (pdu[0] != request[0]) throw ModbusFailure{ModbusFault::damaged, "answer to another function"};
+  return pdu;
+}
+
+std::vector<std::uint16_t> ModbusBus::Connection::read(int unit, std::uint16_t address, int count,
+                                                       Duration timeout) {
+  const std::array<std::uint8_t, 5> request = {read_holding_registers, high(address), low(address),
+                                               high(count), low(count)};
+  const auto answer = exchange(unit, request, timeout);
+  if (answer.size() != static_cast<std::size_t>(2 + 2 * count) || answer[1] != 2 * count)
+    throw ModbusFailure{ModbusFault::damaged,
+                        fmt::format("answer with {} bytes instead of {}", answer[1], 2 * count)};
+  std::vector<std::uint16_t> registers(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < registers.size(); ++i)
+    registers[i] = static_cast<std::uint16_t>(answer[2 + 2 * i] << 8 | answer[3 + 2 * i]);
+  return registers;
+}
+
+void ModbusBus::Connection::write(int unit, std::uint16_t address, std::span<const std::uint16_t> values,
+                                  Duration timeout) {
+  std::vector<std::uint8_t> request;
+  request.reserve(6 + 2 * values.size());
+  const int count = static_cast<int>(values.size());
+  if (count == 1) {
+    request = {write_single_register, high(address), low(address), high(values[0]), low(values[0])};
+  } else {
+    request = {
+        write_multiple_registers, high(address), low(address), high(count), low(count), low(2 * count)};
+    for (const std::uint16_t value : values) {
+      request.push_back(high(value));
+      request.push_back(low(value));
+    }
+  }
+  const auto answer = exchange(unit, request, timeout);
+  // Both functions repeat the first five bytes: address, and value or count.
+  if (answer.size() != 5 || !std::equal(answer.begin(), answer.end(), request.begin()))
+    throw ModbusFailure{ModbusFault::damaged, "answer that confirms another write"};
+}
+
+}  // namespace eigenpose

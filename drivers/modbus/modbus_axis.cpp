@@ -1,0 +1,407 @@
+#include "drivers/modbus/modbus_axis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "core/base/error.h"
+
+namespace eigenpose {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int mergeable_gap = 4;        ///< registers read for nothing rather than asked for apart
+constexpr Duration stop_patience = 3s;  ///< for telling the drive to stop, whatever the caller's deadline
+constexpr Duration standstill_patience = 5s;  ///< for a motor that is told to stop to stand
+
+void check(const ModbusAxisOptions& options) {
+  const auto refuse = [&](const std::string& what) {
+    throw std::invalid_argument("axis " + options.name + ": " + what);
+  };
+  if (options.name.empty()) throw std::invalid_argument("a Modbus axis needs a name");
+  if (!(options.dof.lower < options.dof.upper))
+    refuse(fmt::format("range {} … {} is empty", options.dof.lower, options.dof.upper));
+  if (options.unit < 1 || options.unit > 247)
+    refuse(fmt::format("Modbus unit must be 1 … 247, got {}", options.unit));
+  if (!(options.steps_per_unit > 0) || !std::isfinite(options.steps_per_unit))
+    refuse(fmt::format("steps per {} must be above 0, got {}", options.dof.unit, options.steps_per_unit));
+  if (!(options.speed > 0)) refuse(fmt::format("speed must be above 0, got {}", options.speed));
+  if (!(options.acceleration > 0))
+    refuse(fmt::format("acceleration must be above 0, got {}", options.acceleration));
+  if (!(options.arrival_tolerance >= 0))
+    refuse(fmt::format("arrival tolerance must not be negative, got {}", options.arrival_tolerance));
+  if (!std::isfinite(options.zero_offset)) refuse("zero offset must be a number");
+  if (options.poll_interval <= Duration::zero()) refuse("poll interval must be above 0");
+  if (options.watchdog < Duration::zero() || options.watchdog > 10s) refuse("watchdog must be 0 … 10 s");
+}
+
+/// The cause alone, without "DEVICE: operation: ".
+std::string cause_of(const DeviceError& error) {
+  return std::string(error.what()).substr(error.device().size() + error.operation().size() + 4);
+}
+
+template <class Failure>
+[[noreturn]] void rethrow_with(const Failure& failure, const std::string& consequence) {
+  throw Failure(failure.device(), failure.operation(), cause_of(failure) + "; " + consequence);
+}
+
+}  // namespace
+
+/// Registers a motion so that `stop_motion` can end its wait; also ended by the caller's stop token.
+class ModbusAxis::Motion {
+ public:
+  Motion(ModbusAxis& axis, const std::stop_token& caller)
+      : axis_(axis), on_caller_(caller, [this] { source_.request_stop(); }) {
+    const std::lock_guard lock(axis_.motion_mutex_);
+    axis_.motion_ = &source_;
+  }
+  Motion(const Motion&) = delete;
+  Motion& operator=(const Motion&) = delete;
+  ~Motion() {
+    const std::lock_guard lock(axis_.motion_mutex_);
+    axis_.motion_ = nullptr;
+  }
+  [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
+
+ private:
+  ModbusAxis& axis_;
+  std::stop_source source_;
+  std::stop_callback<std::function<void()>> on_caller_;
+};
+
+ModbusAxis::ModbusAxis(ModbusProfile profile, ModbusAxisOptions options, std::shared_ptr<ModbusBus> bus,
+                       const Clock& clock)
+    : profile_(std::move(profile)), options_(std::move(options)), bus_(std::move(bus)), clock_(clock) {
+  if (!bus_) throw std::invalid_argument("axis " + options_.name + ": no Modbus bus");
+  profile_.check();
+  check(options_);
+  info_.dof = options_.dof;
+  info_.model = profile_.model;
+  info_.resolution = 1.0 / options_.steps_per_unit;
+  info_.arrival_tolerance =
+      options_.arrival_tolerance > 0 ? options_.arrival_tolerance : 2.0 * info_.resolution;
+
+  std::set<int> addresses = {profile_.moving.address};
+  for (const auto* bit : {&profile_.ready, &profile_.in_position, &profile_.homed, &profile_.alarm})
+    if (*bit) addresses.insert((*bit)->address);
+  if (profile_.alarm_code)
+    for (int i = 0; i < profile_.alarm_code->bits / 16; ++i)
+      addresses.insert(profile_.alarm_code->address + i);
+  for (const int address : addresses) {
+    if (!status_blocks_.empty()) {
+      Block& block = status_blocks_.back();
+      if (address - (block.address + block.count) < mergeable_gap) {
+        block.count = address - block.address + 1;
+        continue;
+      }
+    }
+    status_blocks_.push_back({static_cast<std::uint16_t>(address), 1});
+  }
+}
+
+ModbusAxis::~ModbusAxis() {
+  if (!may_be_moving_) return;
+  try {
+    send_stop(clock_.now() + stop_patience);
+  } catch (const Error&) {
+    // Nobody is left to tell; the drive's own watchdog is armed where there is one.
+  }
+}
+
+double ModbusAxis::position_of(std::int64_t steps) const {
+  const double counted = static_cast<double>(steps) / options_.steps_per_unit;
+  return (options_.reversed ? -counted : counted) - options_.zero_offset;
+}
+
+std::int64_t ModbusAxis::steps_of(double position) const {
+  const double from_home = position + options_.zero_offset;
+  return std::llround((options_.reversed ? -from_home : from_home) * options_.steps_per_unit);
+}
+
+double ModbusAxis::shown(double position) const {
+  return options_.dof.canonical(position);
+}
+
+std::string ModbusAxis::in_words(double position) const {
+  return fmt::format("{:.3f} {}", shown(position), options_.dof.unit);
+}
+
+RegisterFill ModbusAxis::motion_fill() const {
+  const double steps_per_s = options_.speed * options_.steps_per_unit;
+  const double steps_per_s2 = options_.acceleration * options_.steps_per_unit;
+  RegisterFill fill;
+  fill.speed = std::llround(
+      profile_.speed_unit == SpeedUnit::rpm ? steps_per_s / profile_.steps_per_turn * 60.0 : steps_per_s);
+  fill.acceleration = std::llround(profile_.acceleration_unit == AccelerationUnit::ms_per_1000rpm
+                                       ? 1000.0 * (1000.0 / 60.0 * profile_.steps_per_turn) / steps_per_s2
+                                       : steps_per_s2);
+  fill.speed = std::max<std::int64_t>(1, fill.speed);
+  fill.acceleration = std::max<std::int64_t>(1, fill.acceleration);
+  fill.watchdog = std::chrono::duration_cast<std::chrono::milliseconds>(options_.watchdog).count();
+  return fill;
+}
+
+ModbusAxis::Reading ModbusAxis::read(const std::string& operation, TimePoint deadline) {
+  const ModbusCaller caller{options_.name, operation, options_.unit};
+  std::map<std::uint16_t, std::uint16_t> registers;
+  for (const Block& block : status_blocks_) {
+    const auto values = bus_->read(caller, block.address, block.count, deadline);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      registers[static_cast<std::uint16_t>(block.address + i)] = values[i];
+  }
+  // The position comes last: what a status of "stands still" is believed of was read after it.
+  const auto position = bus_->read(caller, profile_.position.address, profile_.position.bits / 16, deadline);
+
+  const auto holds = [&](const StatusBit& bit) {
+    return ((registers[bit.address] >> bit.bit & 1) != 0) == bit.active;
+  };
+  Reading reading;
+  reading.moving = holds(profile_.moving);
+  if (profile_.ready) reading.ready = holds(*profile_.ready);
+  if (profile_.in_position) reading.in_position = holds(*profile_.in_position);
+  reading.homed = profile_.homed ? holds(*profile_.homed) : homed_here_;
+  std::int64_t code = 0;
+  if (profile_.alarm_code) {
+    std::vector<std::uint16_t> values;
+    for (int i = 0; i < profile_.alarm_code->bits / 16; ++i)
+      values.push_back(registers[static_cast<std::uint16_t>(profile_.alarm_code->address + i)]);
+    code = decode(*profile_.alarm_code, profile_.word_order, values);
+  }
+  if (profile_.alarm ? holds(*profile_.alarm) : code != 0) {
+    reading.alarm = code != 0 ? profile_.describe_alarm(code) : "alarm (the drive gives no reason)";
+    reading.silence_alarm = code != 0 && profile_.is_silence_alarm(code);
+  }
+  reading.steps = decode(profile_.position, profile_.word_order, position);
+  reading.position = position_of(reading.steps);
+  return reading;
+}
+
+void ModbusAxis::write(const std::string& operation, const RegisterWrites& writes, const RegisterFill& fill,
+                       TimePoint deadline, bool urgent) {
+  const ModbusCaller caller{options_.name, operation, options_.unit, urgent};
+  for (const RegisterWrite& one : writes) {
+    std::vector<std::uint16_t> values;
+    try {
+      values = encode(one, profile_.word_order, fill);
+    } catch (const std::out_of_range& error) {
+      throw DeviceError(options_.name, operation,
+                        std::string("the drive cannot be told this number: ") + error.what());
+    }
+    bus_->write(caller, one.address, values, deadline);
+  }
+}
+
+AxisState ModbusAxis::state(TimePoint deadline) {
+  const Reading reading = read("read state", deadline);
+  if (!reading.moving) may_be_moving_ = false;
+  return {shown(reading.position), reading.moving, reading.homed, reading.alarm};
+}
+
+void ModbusAxis::send_stop(TimePoint deadline) {
+  write("stop", profile_.stop, {}, deadline, true);
+}
+
+void ModbusAxis::stop_motion() {
+  {
+    const std::lock_guard lock(motion_mutex_);
+    if (motion_ != nullptr) motion_->request_stop();
+  }
+  send_stop(clock_.now() + stop_patience);
+}
+
+std::string ModbusAxis::stop_after_failure() {
+  try {
+    send_stop(clock_.now() + stop_patience);
+    return "the drive was told to stop";
+  } catch (const Error& error) {
+    const bool watched = !profile_.arm_watchdog.empty() && options_.watchdog > Duration::zero();
+    return fmt::format(
+        "the drive could NOT be told to stop ({}); {}", error.what(),
+        watched
+            ? fmt::format("its own watchdog stops it after {} ms of silence",
+                          std::chrono::duration_cast<std::chrono::milliseconds>(options_.watchdog).count())
+            : "it may still be moving: use its emergency stop");
+  }
+}
+
+void ModbusAxis::clear_alarm(const std::string& operation, TimePoint deadline) {
+  write(operation, profile_.clear_alarm, {}, deadline);
+}
+
+void ModbusAxis::set_up_after_connecting(const std::string& operation, TimePoint deadline) {
+  write(operation, profile_.connect, {}, deadline);
+  if (bus_->connection_number() != set_up_connection_) homed_here_ = false;
+  set_up_connection_ = bus_->connection_number();
+}
+
+ModbusAxis::Reading ModbusAxis::wait_for_standstill(const std::string& operation, TimePoint deadline) {
+  const TimePoint patience = std::min(deadline, clock_.now() + standstill_patience);
+  for (;;) {
+    const Reading reading = read(operation, deadline);
+    if (!reading.moving) return reading;
+    if (clock_.now() >= patience)
+      throw DeviceError(
+          options_.name, operation,
+          fmt::format("it still moves although told to stop (at {})", in_words(reading.position)));
+    clock_.sleep_for(options_.poll_interval);
+  }
+}
+
+ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation, bool clear_any_alarm,
+                                                   TimePoint deadline, const std::stop_token& stop) {
+  Reading reading = read(operation, deadline);
+  if (bus_->connection_number() != set_up_connection_) {
+    set_up_after_connecting(operation, deadline);
+    reading = read(operation, deadline);
+  }
+  if (reading.moving) {
+    // Left over from an earlier life of this program, or someone else's hand.
+    send_stop(deadline);
+    reading = wait_for_standstill(operation, deadline);
+  }
+  if (reading.alarm && !profile_.clear_alarm.empty() && (reading.silence_alarm || clear_any_alarm)) {
+    clear_alarm(operation, deadline);
+    reading = read(operation, deadline);
+  }
+  if (reading.alarm)
+    throw DeviceError(options_.name, operation,
+                      fmt::format("alarm: {}; remove the cause, then home the axis", *reading.alarm));
+
+  write(operation, profile_.prepare, {}, deadline);
+  const TimePoint patience = std::min(deadline, clock_.now() + options_.start_time);
+  bool set_up_again = false;
+  for (reading = read(operation, deadline); !reading.ready; reading = read(operation, deadline)) {
+    if (stop.stop_requested()) throw Interrupted();
+    if (!set_up_again) {
+      // A drive that was switched off and on behind its gateway has forgotten what it was told.
+      set_up_after_connecting(operation, deadline);
+      set_up_again = true;
+    }
+    if (clock_.now() >= patience)
+      throw DeviceError(options_.name, operation,
+                        "the drive is not ready: is its power on and the motor enabled?");
+    clock_.sleep_until(clock_.now() + options_.poll_interval, stop);
+  }
+  return reading;
+}
+
+ModbusAxis::Reading ModbusAxis::wait_for(const std::string& operation, Goal goal, double target,
+                                         TimePoint deadline, const std::stop_token& stop) {
+  const TimePoint start = clock_.now();
+  TimePoint last_change = start;
+  TimePoint still_since = start;
+  bool was_moving = false;
+  bool moved_at_all = false;
+  std::optional<std::int64_t> last_steps;
+  for (;;) {
+    if (stop.stop_requested()) throw Interrupted("stopped on request: " + options_.name + ": " + operation);
+    const Reading reading = read(operation, deadline);
+    const TimePoint now = clock_.now();
+    if (reading.alarm) throw DeviceError(options_.name, operation, "alarm: " + *reading.alarm);
+    if (last_steps && *last_steps != reading.steps) last_change = now;
+    last_steps = reading.steps;
+
+    if (reading.moving) {
+      was_moving = moved_at_all = true;
+      if (now - last_change >= options_.stall_time)
+        throw DeviceError(options_.name, operation,
+                          fmt::format("the motor is stuck at {}", in_words(reading.position)));
+    } else {
+      if (was_moving) still_since = now;
+      was_moving = false;
+      const bool settled = reading.in_position;
+      const bool there = goal == Goal::target
+                             ? std::abs(reading.position - target) <= info_.arrival_tolerance
+                             : reading.homed && (moved_at_all || now - start >= options_.start_time);
+      if (there && settled) return reading;
+      const Duration patience = moved_at_all ? options_.settle_time : options_.start_time;
+      if (now - still_since >= patience) {
+        if (goal == Goal::home)
+          throw DeviceError(options_.name, operation, "the drive stands still and is not homed");
+        throw DeviceError(options_.name, operation,
+                          fmt::format("{} at {}, not at {}: blocked, or steps were lost",
+                                      moved_at_all ? "it stopped" : "it did not move and stands",
+                                      in_words(reading.position), in_words(target)));
+      }
+    }
+    if (now >= deadline)
+      throw DeviceTimeout(options_.name, operation,
+                          fmt::format("not there by the deadline; it is at {}", in_words(reading.position)));
+    clock_.sleep_until(std::min(deadline, now + options_.poll_interval), stop);
+  }
+}
+
+ModbusAxis::Reading ModbusAxis::run(const std::string& operation, Goal goal, const RegisterWrites& command,
+                                    const RegisterFill& fill, TimePoint deadline,
+                                    const std::stop_token& stop) {
+  const bool watched = !profile_.arm_watchdog.empty() && options_.watchdog > Duration::zero();
+  std::string consequence;
+  try {
+    if (stop.stop_requested()) throw Interrupted("stopped on request: " + options_.name + ": " + operation);
+    may_be_moving_ = true;
+    if (watched) write(operation, profile_.arm_watchdog, fill, deadline);
+    write(operation, command, fill, deadline);
+    const Reading reading = wait_for(operation, goal, position_of(fill.position), deadline, stop);
+    may_be_moving_ = false;
+    if (watched) write(operation, profile_.disarm_watchdog, fill, deadline);
+    return reading;
+  } catch (const Interrupted&) {
+    stop_after_failure();
+    throw;
+  } catch (const DeviceTimeout& failure) {
+    rethrow_with(failure, stop_after_failure());
+  } catch (const DeviceLost& failure) {
+    rethrow_with(failure, stop_after_failure());
+  } catch (const DeviceError& failure) {
+    rethrow_with(failure, stop_after_failure());
+  }
+}
+
+void ModbusAxis::home(TimePoint deadline, std::stop_token stop) {
+  const Motion motion(*this, stop);
+  const std::string operation = "home";
+  if (motion.token().stop_requested()) throw Interrupted();
+  read_ready_to_move(operation, true, deadline, motion.token());
+  RegisterFill fill = motion_fill();
+  fill.position = steps_of(-options_.zero_offset);
+  const Reading reading = run(operation, Goal::home, profile_.home, fill, deadline, motion.token());
+  homed_here_ = true;
+  if (profile_.home_steps &&
+      std::abs(position_of(reading.steps) - position_of(*profile_.home_steps)) > info_.arrival_tolerance) {
+    homed_here_ = false;
+    throw DeviceError(
+        options_.name, operation,
+        fmt::format("homing ended at {} steps instead of {}", reading.steps, *profile_.home_steps));
+  }
+}
+
+double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token stop) {
+  const Dof& dof = options_.dof;
+  if (!(position >= dof.lower && position <= dof.upper))
+    throw std::out_of_range(
+        fmt::format("{}: {} {} is outside {} … {}", options_.name, position, dof.unit, dof.lower, dof.upper));
+  const Motion motion(*this, stop);
+  const std::string operation = fmt::format("move to {} {}", position, dof.unit);
+  if (motion.token().stop_requested()) throw Interrupted();
+  const Reading before = read_ready_to_move(operation, false, deadline, motion.token());
+  if (!before.homed) throw DeviceError(options_.name, operation, "not homed; home the axis first");
+
+  RegisterFill fill = motion_fill();
+  // The drive counts on over whole turns; the way to go is the short one from where it is.
+  double target = before.position + dof.difference(position, before.position);
+  fill.position = steps_of(target);
+  if (std::abs(fill.position) > std::numeric_limits<std::int32_t>::max() && dof.periodic) {
+    target = dof.canonical(position);  // the counter is at its end: the long way, once in a lifetime
+    fill.position = steps_of(target);
+  }
+  const Reading after = run(operation, Goal::target, profile_.move, fill, deadline, motion.token());
+  return shown(after.position);
+}
+
+}  // namespace eigenpose
