@@ -131,6 +131,9 @@ AxisOptions read_axis(const TomlTable& table, const std::filesystem::path& base)
   if (dof.periodic && dof.upper - dof.lower != 360.0)
     table.fail("upper", fmt::format("a periodic axis spans 360 deg, not {}", dof.upper - dof.lower));
   options.home_offset = table.number("home_offset", 0.0, -no_limit, no_limit);
+  if (table.has("steps_per_unit"))
+    options.steps_per_unit = table.number("steps_per_unit", std::nullopt, 1e-3, 1e7);
+  options.reversed = table.flag("reversed", false);
   if (table.has("speed")) options.speed = table.number("speed", std::nullopt, 1e-6, 1e6);
   if (table.has("arrival_tolerance"))
     options.arrival_tolerance = table.number("arrival_tolerance", std::nullopt, 1e-6, 10.0);

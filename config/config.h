@@ -62,6 +62,8 @@ struct AxisOptions {
   std::filesystem::path profile;            ///< modbus: register description; empty: Oriental Motor AZ
   int station = 1;                          ///< modbus: the drive's address on the bus
   double home_offset = 0.0;                 ///< the axis's zero, counted from the home position, in the unit
+  std::optional<double> steps_per_unit;     ///< gears included; the profile's own if not given
+  bool reversed = false;                    ///< the drive counts up where the axis counts down
   std::optional<double> speed;              ///< unit per second; the profile's own if not given
   std::optional<double> arrival_tolerance;  ///< in the unit; the profile's own if not given
   std::chrono::milliseconds settle{200};    ///< vibration dies out after arrival

@@ -205,6 +205,18 @@ std::vector<std::pair<std::string, std::int64_t>> TomlTable::integers(std::strin
   return result;
 }
 
+std::vector<std::pair<std::string, std::string>> TomlTable::text_pairs(std::string_view key) const {
+  const toml::node* node = impl_->find(key);
+  std::vector<std::pair<std::string, std::string>> result;
+  if (node == nullptr) return result;
+  if (!node->is_table()) impl_->fail(*node, key, "a table of texts is needed");
+  for (const auto& [name, value] : *node->as_table()) {
+    if (!value.is_string()) impl_->fail(value, name.str(), "a text in quotes is needed");
+    result.emplace_back(name.str(), value.as_string()->get());
+  }
+  return result;
+}
+
 std::optional<TomlTable> TomlTable::table(std::string_view key) const {
   const toml::node* node = impl_->find(key);
   if (node == nullptr) return std::nullopt;

@@ -43,6 +43,8 @@ class TomlTable {
   [[nodiscard]] std::vector<std::string> texts(std::string_view key) const;
   /// Every key of a table whose values are integers: [camera.controls].
   [[nodiscard]] std::vector<std::pair<std::string, std::int64_t>> integers(std::string_view key) const;
+  /// Every key of a table whose values are texts: [alarm.text].
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> text_pairs(std::string_view key) const;
 
   /// The table [key], if it is there.
   [[nodiscard]] std::optional<TomlTable> table(std::string_view key) const;

@@ -218,16 +218,32 @@ void ModbusAxis::stop_motion() {
 std::string ModbusAxis::stop_after_failure() {
   try {
     send_stop(clock_.now() + stop_patience);
-    return "the drive was told to stop";
   } catch (const Error& error) {
-    const bool watched = !profile_.arm_watchdog.empty() && options_.watchdog > Duration::zero();
     return fmt::format(
         "the drive could NOT be told to stop ({}); {}", error.what(),
-        watched
+        watchdog_armed_
             ? fmt::format("its own watchdog stops it after {} ms of silence",
                           std::chrono::duration_cast<std::chrono::milliseconds>(options_.watchdog).count())
             : "it may still be moving: use its emergency stop");
   }
+  try {
+    disarm_watchdog("stop", clock_.now() + stop_patience);
+  } catch (const Error&) {
+    // Then it raises an alarm of silence, which the next motion clears.
+  }
+  return "the drive was told to stop";
+}
+
+void ModbusAxis::arm_watchdog(const std::string& operation, TimePoint deadline) {
+  if (profile_.arm_watchdog.empty() || options_.watchdog == Duration::zero()) return;
+  watchdog_armed_ = true;
+  write(operation, profile_.arm_watchdog, motion_fill(), deadline);
+}
+
+void ModbusAxis::disarm_watchdog(const std::string& operation, TimePoint deadline) {
+  if (!watchdog_armed_) return;
+  write(operation, profile_.disarm_watchdog, {}, deadline);
+  watchdog_armed_ = false;
 }
 
 void ModbusAxis::clear_alarm(const std::string& operation, TimePoint deadline) {
@@ -340,16 +356,14 @@ ModbusAxis::Reading ModbusAxis::wait_for(const std::string& operation, Goal goal
 ModbusAxis::Reading ModbusAxis::run(const std::string& operation, Goal goal, const RegisterWrites& command,
                                     const RegisterFill& fill, TimePoint deadline,
                                     const std::stop_token& stop) {
-  const bool watched = !profile_.arm_watchdog.empty() && options_.watchdog > Duration::zero();
-  std::string consequence;
   try {
     if (stop.stop_requested()) throw Interrupted("stopped on request: " + options_.name + ": " + operation);
     may_be_moving_ = true;
-    if (watched) write(operation, profile_.arm_watchdog, fill, deadline);
+    arm_watchdog(operation, deadline);
     write(operation, command, fill, deadline);
     const Reading reading = wait_for(operation, goal, position_of(fill.position), deadline, stop);
     may_be_moving_ = false;
-    if (watched) write(operation, profile_.disarm_watchdog, fill, deadline);
+    disarm_watchdog(operation, deadline);
     return reading;
   } catch (const Interrupted&) {
     stop_after_failure();

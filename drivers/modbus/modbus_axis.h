@@ -94,6 +94,8 @@ class ModbusAxis final : public Axis {
   /// Tries to stop after a failure; never throws. Says in words how it went.
   std::string stop_after_failure();
   void send_stop(TimePoint deadline);
+  void arm_watchdog(const std::string& operation, TimePoint deadline);
+  void disarm_watchdog(const std::string& operation, TimePoint deadline);
 
   [[nodiscard]] double position_of(std::int64_t steps) const;
   [[nodiscard]] std::int64_t steps_of(double position) const;
@@ -108,7 +110,8 @@ class ModbusAxis final : public Axis {
   AxisInfo info_;
   std::vector<Block> status_blocks_;
   std::uint64_t set_up_connection_ = 0;  ///< the connection on which `connect` was written
-  bool homed_here_ = false;              ///< for profiles without a homed bit
+  bool watchdog_armed_ = false;
+  bool homed_here_ = false;  ///< for profiles without a homed bit
   std::atomic<bool> may_be_moving_{false};
 
   std::mutex motion_mutex_;

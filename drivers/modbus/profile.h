@@ -7,6 +7,7 @@
 /// them. Addresses are the protocol's own, counted from 0 (a manual that counts from 40001 is 40001 too
 /// high).
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -75,11 +76,21 @@ struct SerialDefaults {
   Duration silent_interval{};  ///< what the drive wants between frames, beyond the protocol's 3.5 characters
 };
 
+/// What an axis gets of which the rig says nothing. "Unit" is the axis's unit, degrees or millimetres.
+struct AxisDefaults {
+  double steps_per_unit = 100.0;                ///< steps of the drive for one unit, gears included
+  double speed = 20.0;                          ///< unit/s
+  double acceleration = 40.0;                   ///< unit/s²
+  double arrival_tolerance = 0.0;               ///< in the unit; 0: two steps
+  Duration watchdog = std::chrono::seconds(2);  ///< silence after which a moving drive stops by itself
+};
+
 /// The whole map. `check` says whether it can be used.
 struct ModbusProfile {
   std::string model;  ///< "Oriental Motor AZ"
   WordOrder word_order = WordOrder::high_first;
   SerialDefaults serial;
+  AxisDefaults defaults;
 
   double steps_per_turn = 0.0;  ///< of the motor as delivered; only to convert rpm, 0 if no unit needs it
   SpeedUnit speed_unit = SpeedUnit::steps_per_s;

@@ -1,0 +1,167 @@
+// Reading Modbus device profiles.
+
+#include "config/modbus_profile.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+
+namespace eigenpose {
+namespace {
+
+using testing::HasSubstr;
+
+const std::filesystem::path profiles = std::filesystem::path(EIGENPOSE_SOURCE_DIR) / "config" / "profiles";
+
+/// The smallest drive that can be used; each test spoils one thing.
+const std::string smallest = R"(format = 1
+kind = "drive"
+model = "Test drive"
+word_order = "high_first"
+[units]
+speed = "steps_per_s"
+acceleration = "steps_per_s2"
+[position]
+register = 0x10
+bits = 32
+[status]
+moving = { register = 0x20, bit = 1 }
+[alarm]
+register = 0x30
+bits = 16
+[commands]
+home = [{ register = 1, values = ["1:16"] }]
+move = [{ register = 2, values = ["position:32"] }]
+stop = [{ register = 1, values = ["2:16"] }]
+)";
+
+std::string with(const std::string& old, const std::string& replacement) {
+  std::string text = smallest;
+  const std::size_t at = text.find(old);
+  EXPECT_NE(at, std::string::npos) << old;
+  return text.replace(at, old.size(), replacement);
+}
+
+std::string complaint(const std::string& text) {
+  try {
+    (void)parse_modbus_profile(text, "drive.toml");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no complaint";
+}
+
+TEST(ModbusProfile, EveryShippedDriveProfileCanBeRead) {
+  int drives = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(profiles)) {
+    if (entry.path().extension() != ".toml") continue;
+    std::ifstream file(entry.path());
+    const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    if (text.find("kind = \"lamp\"") != std::string::npos) {
+      EXPECT_NO_THROW((void)read_modbus_lamp_profile(entry.path())) << entry.path();
+    } else {
+      EXPECT_NO_THROW((void)read_modbus_profile(entry.path())) << entry.path();
+      ++drives;
+    }
+  }
+  EXPECT_GE(drives, 1);
+}
+
+TEST(ModbusProfile, OrientalMotorMovesByDirectDataOperation) {
+  const ModbusProfile profile = read_modbus_profile(profiles / "oriental_motor_az.toml");
+  ASSERT_EQ(profile.move.size(), 1U);
+  EXPECT_EQ(profile.move[0].address, 0x0058);
+  RegisterFill fill;
+  fill.position = -2;
+  fill.speed = 3000;
+  fill.acceleration = 70000;
+  const auto registers = encode(profile.move[0], profile.word_order, fill);
+  EXPECT_THAT(registers,
+              testing::ElementsAre(0, 0, 0, 1, 0xFFFF, 0xFFFE, 0, 3000, 1, 4464, 1, 4464, 0, 1000, 0, 1));
+}
+
+TEST(ModbusProfile, TheBuiltInProfileIsTheShippedFile) {
+  const ModbusProfile shipped = read_modbus_profile(profiles / "oriental_motor_az.toml");
+  const ModbusProfile built_in = oriental_motor_az_profile();
+  EXPECT_EQ(built_in.model, shipped.model);
+  EXPECT_EQ(built_in.alarms, shipped.alarms);
+  EXPECT_EQ(built_in.position.address, shipped.position.address);
+}
+
+TEST(ModbusProfile, SaysAlarmsInWords) {
+  const ModbusProfile profile = oriental_motor_az_profile();
+  EXPECT_THAT(profile.describe_alarm(0x30), HasSubstr("overload"));
+  EXPECT_THAT(profile.describe_alarm(0x99), HasSubstr("0x99"));
+  EXPECT_TRUE(profile.is_silence_alarm(0x85));
+  EXPECT_FALSE(profile.is_silence_alarm(0x30));
+}
+
+TEST(ModbusProfile, AMissingFileIsNamed) {
+  EXPECT_THROW((void)read_modbus_profile("/nowhere/drive.toml"), FileError);
+}
+
+TEST(ModbusProfile, TheSmallestDriveIsAccepted) {
+  EXPECT_NO_THROW((void)parse_modbus_profile(smallest, "drive.toml"));
+}
+
+TEST(ModbusProfile, AnUnknownKeyIsRefusedWithFileAndLine) {
+  EXPECT_THAT(complaint(with("bits = 32\n", "bits = 32\nsinged = true\n")), HasSubstr("drive.toml:11: "));
+  EXPECT_THAT(complaint(with("bits = 32\n", "bits = 32\nsinged = true\n")), HasSubstr("signed"));
+  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 1, wenn = 0 }")), HasSubstr("wenn"));
+  EXPECT_THAT(complaint(smallest + "stopp = []\n"), HasSubstr("stopp"));
+}
+
+TEST(ModbusProfile, ImpossibleValuesAreRefused) {
+  EXPECT_THAT(complaint(with("format = 1", "format = 2")), HasSubstr("drive.toml:1: "));
+  EXPECT_THAT(complaint(with("kind = \"drive\"", "kind = \"lamp\"")), HasSubstr("drive.toml:2: "));
+  EXPECT_THAT(complaint(with("bits = 32", "bits = 24")), HasSubstr("24"));
+  EXPECT_THAT(complaint(with("register = 0x20", "register = 65536")), HasSubstr("65536"));
+  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 16 }")), HasSubstr("16"));
+  EXPECT_THAT(complaint(with("\"position:32\"", "\"position:24\"")), HasSubstr("position:24"));
+  EXPECT_THAT(complaint(with("\"position:32\"", "\"positron:32\"")), HasSubstr("positron"));
+  EXPECT_THAT(complaint(with("\"1:16\"", "\"65536:16\"")), HasSubstr("65536"));
+  EXPECT_THAT(complaint(with("\"1:16\"", "\"1\"")), HasSubstr("WHAT:BITS"));
+}
+
+TEST(ModbusProfile, WhatWouldBeDangerousIsRefused) {
+  EXPECT_THAT(complaint(with("stop = [{ register = 1, values = [\"2:16\"] }]", "")),
+              HasSubstr("no stop command"));
+  EXPECT_THAT(complaint(with("\"position:32\"", "\"5:32\"")), HasSubstr("writes no position"));
+  EXPECT_THAT(complaint(with("[alarm]\nregister = 0x30\nbits = 16\n", "")), HasSubstr("alarm"));
+  EXPECT_THAT(complaint(with("moving = { register = 0x20, bit = 1 }", "")), HasSubstr("moving"));
+  EXPECT_THAT(complaint(smallest + "arm_watchdog = [{ register = 9, values = [\"watchdog_ms:16\"] }]\n"),
+              HasSubstr("never disarmed"));
+  EXPECT_THAT(complaint(with("speed = \"steps_per_s\"", "speed = \"rpm\"")), HasSubstr("steps_per_turn"));
+}
+
+TEST(ModbusRegisters, BothWordOrdersComeBackAsWritten) {
+  for (const WordOrder order : {WordOrder::high_first, WordOrder::low_first}) {
+    for (const std::int64_t value : {0LL, 1LL, -1LL, 65535LL, 65536LL, -2147483648LL, 2147483647LL}) {
+      RegisterFill fill;
+      fill.position = value;
+      const RegisterWrite write{7, {{RegisterMeaning::position, 0, 32}}};
+      EXPECT_EQ(decode({7, 32, true}, order, encode(write, order, fill)), value);
+    }
+  }
+  EXPECT_EQ(decode({0, 32, true}, WordOrder::low_first, std::vector<std::uint16_t>{1, 2}), 0x20001);
+  EXPECT_EQ(decode({0, 16, true}, WordOrder::high_first, std::vector<std::uint16_t>{0xFFFF}), -1);
+  EXPECT_EQ(decode({0, 16, false}, WordOrder::high_first, std::vector<std::uint16_t>{0xFFFF}), 65535);
+}
+
+TEST(ModbusRegisters, ANumberThatDoesNotFitIsNotCutOff) {
+  RegisterFill fill;
+  fill.speed = 65536;
+  EXPECT_THROW((void)encode({1, {{RegisterMeaning::speed, 0, 16}}}, WordOrder::high_first, fill),
+               std::out_of_range);
+  fill.speed = -32769;
+  EXPECT_THROW((void)encode({1, {{RegisterMeaning::speed, 0, 16}}}, WordOrder::high_first, fill),
+               std::out_of_range);
+}
+
+}  // namespace
+}  // namespace eigenpose
