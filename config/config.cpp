@@ -81,8 +81,12 @@ CameraOptions read_camera(const TomlTable& table, const std::filesystem::path& b
   options.name = read_name(table, "name", options.name);
   options.driver = table.choice("driver", std::nullopt, {"v4l2", "simulated", "replay"});
   if (options.driver == "v4l2") {
-    options.device = table.text("device");
-    options.format = table.choice("format", options.format, {"auto", "YUYV", "NV12", "GREY", "MJPEG"});
+    options.serial = table.text("serial", "");
+    options.bus_path = table.text("bus_path", "");
+    options.device = table.text("device", "");
+    options.format = table.choice("format", options.format, {"auto", "YUYV", "NV12", "GREY", "MJPG"});
+    options.color = table.flag("color", options.color);
+    options.lock_automatics = table.flag("lock_automatics", options.lock_automatics);
     options.controls = table.integers("controls");
   }
   if (options.driver == "replay") {
@@ -143,12 +147,19 @@ AxisOptions read_axis(const TomlTable& table, const std::filesystem::path& base)
   return options;
 }
 
-LampOptions read_lamp(const TomlTable& table) {
+LampOptions read_lamp(const TomlTable& table, const std::filesystem::path& base) {
   LampOptions options;
   options.name = read_name(table, "name");
   options.driver = table.choice("driver", std::nullopt, {"dmx", "modbus", "simulated"});
   if (options.driver != "simulated") options.endpoint = table.text("endpoint");
-  options.channel = static_cast<int>(table.integer("channel", options.channel, 1, 512));
+  if (options.driver == "dmx")
+    options.channel = static_cast<int>(table.integer("channel", options.channel, 1, 512));
+  if (options.driver == "modbus") {
+    options.profile = read_path(table, "profile", "", base);
+    if (options.profile.empty())
+      table.fail("profile", "a file that says which register dims the lamp is needed");
+    options.station = static_cast<int>(table.integer("station", options.station, 1, 247));
+  }
   options.level = table.number("level", options.level, 0.0, 1.0);
   table.finish();
   return options;
@@ -249,7 +260,7 @@ Config read(const TomlTable& root, const std::filesystem::path& file) {
   for (const TomlTable& table : axes) config.axes.push_back(read_axis(table, base));
   refuse_twins(axes, config.axes, [](const AxisOptions& axis) { return axis.dof.name; });
   const std::vector<TomlTable> lamps = root.tables("lamp");
-  for (const TomlTable& table : lamps) config.lamps.push_back(read_lamp(table));
+  for (const TomlTable& table : lamps) config.lamps.push_back(read_lamp(table, base));
   refuse_twins(lamps, config.lamps, [](const LampOptions& lamp) { return lamp.name; });
   const std::vector<TomlTable> plans = root.tables("plan");
   for (const TomlTable& table : plans) config.plans.push_back(read_plan(table, config.dofs()));

@@ -43,8 +43,12 @@ struct ApiOptions {
 struct CameraOptions {
   std::string name = "camera";
   std::string driver;            ///< "v4l2", "simulated", "replay"
-  std::filesystem::path device;  ///< v4l2: /dev/video0 or a name below /dev/v4l/by-id
-  std::string format = "auto";   ///< v4l2: "YUYV", "NV12", "GREY", "MJPEG", or "auto"
+  std::string serial;            ///< v4l2: USB serial number; empty: does not matter
+  std::string bus_path;          ///< v4l2: the socket it is plugged into; empty: does not matter
+  std::filesystem::path device;  ///< v4l2: /dev/video0; empty: does not matter
+  bool color = true;             ///< v4l2: false reads grey only
+  bool lock_automatics = true;   ///< v4l2: automatic exposure, gain, white balance and focus are turned off
+  std::string format = "auto";   ///< v4l2: "YUYV", "NV12", "GREY", "MJPG", or "auto"
   int width = 640;               ///< pixels
   int height = 480;              ///< pixels
   double frames_per_second = 30.0;
@@ -73,10 +77,12 @@ struct AxisOptions {
 /// [[lamp]]
 struct LampOptions {
   std::string name;
-  std::string driver;    ///< "dmx", "modbus", "simulated"
-  std::string endpoint;  ///< dmx: "usb:SERIAL"
-  int channel = 1;       ///< dmx: 1…512
-  double level = 1.0;    ///< 0…1, set at the start
+  std::string driver;             ///< "dmx", "modbus", "simulated"
+  std::string endpoint;           ///< dmx: "usb:SERIAL"; modbus: as for an axis
+  std::filesystem::path profile;  ///< modbus: register description
+  int station = 1;                ///< modbus: 1…247
+  int channel = 1;                ///< dmx: 1…512
+  double level = 1.0;             ///< 0…1, set at the start
 };
 
 /// [learn]

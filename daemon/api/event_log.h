@@ -1,0 +1,52 @@
+#pragma once
+
+/// The last events, numbered, for any number of readers each at its own pace.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+namespace eigenpose {
+
+/// A ring of events. A reader asks for the next one after those it has seen; one that lags more than
+/// `capacity` behind loses the oldest and is told how many. Publishing never waits for a reader. Thread-safe.
+class EventLog {
+ public:
+  /// @param capacity events kept, ≥ 1.
+  explicit EventLog(std::size_t capacity);
+  EventLog(const EventLog&) = delete;
+  EventLog& operator=(const EventLog&) = delete;
+
+  struct Event {
+    std::uint64_t sequence = 0;  ///< 1, 2, 3 …
+    std::shared_ptr<const std::string> data;
+    std::uint64_t lost = 0;  ///< events between the reader's last one and this one that are no longer kept
+  };
+
+  /// Adds an event. @param make is given its sequence number and returns its text.
+  std::uint64_t publish(const std::function<std::string(std::uint64_t)>& make);
+
+  /// The first event kept whose number is above `sequence`; nothing if there is none yet. A number beyond the
+  /// last one (from a former run of the program) counts as 0.
+  [[nodiscard]] std::optional<Event> after(std::uint64_t sequence) const;
+  [[nodiscard]] std::optional<Event> latest() const;
+  [[nodiscard]] std::uint64_t last_sequence() const;
+
+  /// Called after each `publish`, on the publishing thread; must be quick. Empty: nobody.
+  void on_publish(std::function<void()> listener);
+
+ private:
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::deque<std::shared_ptr<const std::string>> kept_;  ///< guarded by mutex_
+  std::uint64_t last_ = 0;                               ///< guarded by mutex_: number of kept_.back()
+  std::mutex listener_mutex_;
+  std::function<void()> listener_;  ///< guarded by listener_mutex_
+};
+
+}  // namespace eigenpose

@@ -1,0 +1,156 @@
+#include "daemon/api/json.h"
+
+#include <fmt/chrono.h>
+#include <nlohmann/json.hpp>
+
+namespace eigenpose {
+namespace {
+
+using nlohmann::json;
+
+template <typename Value>
+json or_null(const std::optional<Value>& value) {
+  return value ? json(*value) : json(nullptr);
+}
+
+json or_null(const std::string& text) {
+  return text.empty() ? json(nullptr) : json(text);
+}
+
+}  // namespace
+
+std::string iso_time(std::chrono::system_clock::time_point time) {
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch()).count();
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(ms / 1000)),
+                     ms % 1000);
+}
+
+json to_json(const Workspace& workspace) {
+  json dofs = json::array();
+  for (const Dof& dof : workspace.dofs())
+    dofs.push_back({{"name", dof.name},
+                    {"unit", dof.unit},
+                    {"lower", dof.lower},
+                    {"upper", dof.upper},
+                    {"periodic", dof.periodic}});
+  return dofs;
+}
+
+json to_json(const CameraStatus& camera) {
+  if (!camera.configured) return nullptr;
+  json result = {{"error", or_null(camera.error)},
+                 {"frames_taken", camera.statistics.frames_taken},
+                 {"frames_dropped", camera.statistics.frames_dropped},
+                 {"frames_damaged", camera.statistics.frames_damaged},
+                 {"times_lost", camera.statistics.times_lost}};
+  if (camera.info) {
+    result["name"] = camera.info->name;
+    result["model"] = camera.info->model;
+    result["serial"] = or_null(camera.info->serial);
+    result["format"] = camera.info->format;
+    result["width"] = camera.info->width;
+    result["height"] = camera.info->height;
+    result["frames_per_second"] = camera.info->frames_per_second;
+    result["controls"] = camera.info->controls;
+  }
+  return result;
+}
+
+json to_json(const AxisStatus& axis) {
+  json result = {{"name", axis.dof.name},
+                 {"unit", axis.dof.unit},
+                 {"lower", axis.dof.lower},
+                 {"upper", axis.dof.upper},
+                 {"periodic", axis.dof.periodic},
+                 {"model", or_null(axis.model)},
+                 {"error", or_null(axis.error)},
+                 {"position", nullptr},
+                 {"moving", false},
+                 {"homed", false},
+                 {"alarm", nullptr}};
+  if (axis.state) {
+    result["position"] = axis.state->position;
+    result["moving"] = axis.state->moving;
+    result["homed"] = axis.state->homed;
+    result["alarm"] = or_null(axis.state->alarm);
+  }
+  return result;
+}
+
+json to_json(const JobStatus& job) {
+  return {{"id", job.id},
+          {"kind", job.kind},
+          {"subject", or_null(job.subject)},
+          {"state", job_state_name(job.state)},
+          {"stage", or_null(job.stage)},
+          {"done", job.done},
+          {"total", job.total},
+          {"error", or_null(job.error)},
+          {"hint", or_null(job.hint)},
+          {"result", job.result.empty() ? json(nullptr) : json::parse(job.result)},
+          {"started", iso_time(job.started)},
+          {"ended", job.ended ? json(iso_time(*job.ended)) : json(nullptr)}};
+}
+
+json status_json(Service& service) {
+  json axes = json::array();
+  for (const AxisStatus& axis : service.rig().status()) axes.push_back(to_json(axis));
+  json running = json::array();
+  for (const JobStatus& job : service.jobs().list())
+    if (job.state == JobState::running) running.push_back(to_json(job));
+  json plans = json::array();
+  for (const Plan& plan : service.config().plans)
+    plans.push_back({{"name", plan.name}, {"views", plan.size()}});
+
+  json model = nullptr;
+  if (const auto current = service.models().current()) {
+    std::size_t views = 0;
+    for (const ModelObject& object : current->objects) views += object.views;
+    model = {{"objects", current->objects.size()},
+             {"views", views},
+             {"components", current->eigenspace.components()},
+             {"size", current->normalization.size},
+             {"color", current->normalization.color},
+             {"created", current->provenance.created}};
+  }
+  json simulation = nullptr;
+  if (const auto& sim = service.simulation())
+    simulation = {{"lab_socket", sim->lab_socket.string()},
+                  {"modbus_endpoint", fmt::format("tcp://127.0.0.1:{}", sim->modbus_port)}};
+  return {{"program", "eigenposed"},
+          {"version", EIGENPOSE_VERSION},
+          {"started", iso_time(service.started())},
+          {"state", service.state()},
+          {"camera", to_json(service.camera().status())},
+          {"axes", std::move(axes)},
+          {"plans", std::move(plans)},
+          {"model", std::move(model)},
+          {"model_error", or_null(service.models().error())},
+          {"last_result", service.results()->last_sequence()},
+          {"jobs", std::move(running)},
+          {"sim", std::move(simulation)}};
+}
+
+json objects_json(const Service& service) {
+  const auto model = service.models().current();
+  json objects = json::array();
+  for (const ObjectStatus& object : service.objects()) {
+    json entry = {{"name", object.name},
+                  {"image_set", nullptr},
+                  {"learned", nullptr},
+                  {"error", or_null(object.trouble)}};
+    if (object.acquired)
+      entry["image_set"] = {{"views", object.acquired->views}, {"complete", object.acquired->complete}};
+    if (object.learned_as && model && *object.learned_as < model->objects.size()) {
+      const ModelObject& learned = model->objects[*object.learned_as];
+      entry["learned"] = {{"views", learned.views},
+                          {"rejection_distance", learned.rejection_distance},
+                          {"pose_observable", learned.pose_observable},
+                          {"workspace", to_json(learned.workspace)}};
+    }
+    objects.push_back(std::move(entry));
+  }
+  return {{"objects", std::move(objects)}};
+}
+
+}  // namespace eigenpose

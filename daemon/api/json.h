@@ -1,0 +1,28 @@
+#pragma once
+
+/// The API's JSON: one function a thing. Numbers carry their unit in the key; keys are stable.
+
+#include <chrono>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/base/workspace.h"
+#include "daemon/frame_hub.h"
+#include "daemon/jobs.h"
+#include "daemon/rig.h"
+#include "daemon/service.h"
+
+namespace eigenpose {
+
+/// "2026-11-22T02:03:04.567Z"
+std::string iso_time(std::chrono::system_clock::time_point time);
+
+nlohmann::json to_json(const Workspace& workspace);
+nlohmann::json to_json(const CameraStatus& camera);
+nlohmann::json to_json(const AxisStatus& axis);
+nlohmann::json to_json(const JobStatus& job);
+nlohmann::json status_json(Service& service);
+nlohmann::json objects_json(const Service& service);
+
+}  // namespace eigenpose

@@ -1,0 +1,192 @@
+#include "daemon/api/routes.h"
+
+#include <charconv>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/api/errors.h"
+#include "daemon/api/event_log.h"
+#include "daemon/api/json.h"
+
+namespace eigenpose {
+namespace {
+
+using nlohmann::json;
+
+/// A route's code is given the request and what stood in the place of {id}.
+using Act = Answer (*)(Service& service, const Request& request, const std::string& id);
+
+struct Route {
+  std::string_view method;
+  std::string_view path;  ///< may end in "/{id}"
+  Access needs;
+  Act act;
+};
+
+Response reply(const json& body, int status = 200) {
+  // Names of files and devices may hold anything; JSON must stay valid.
+  return {status, "application/json", body.dump(-1, ' ', false, json::error_handler_t::replace) + "\n", {}};
+}
+
+std::uint64_t sequence_number(const std::string& text, std::uint64_t fallback) {
+  if (text.empty()) return fallback;
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw RequestError(400, "\"" + text + "\" is not a sequence number",
+                       "give the id of the last event you have seen");
+  return number;
+}
+
+/// The body as an object with no other keys than these.
+json body_object(const Request& request, std::initializer_list<std::string_view> allowed) {
+  const json body = request.body.empty() ? json::object() : json::parse(request.body);
+  if (!body.is_object()) throw RequestError(400, "the body is not a JSON object", "send {\"key\": value}");
+  for (const auto& [key, value] : body.items())
+    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end())
+      throw RequestError(400, "unknown key \"" + key + "\"",
+                         fmt::format("allowed: {}", fmt::join(allowed, ", ")));
+  return body;
+}
+
+Answer get_status(Service& service, const Request&, const std::string&) {
+  return reply(status_json(service));
+}
+
+Answer get_objects(Service& service, const Request&, const std::string&) {
+  return reply(objects_json(service));
+}
+
+Answer get_latest(Service& service, const Request&, const std::string&) {
+  const auto event = service.results()->latest();
+  if (!event)
+    throw RequestError(404, "there is no result yet",
+                       "results come once a model is learned and the camera runs");
+  return Response{200, "application/json", *event->data + "\n", {}};
+}
+
+Answer get_results(Service& service, const Request& request, const std::string&) {
+  const auto given = request.query.find("after");
+  const std::string& after = given != request.query.end() ? given->second : request.last_event_id;
+  return EventStream{service.results(), "result", sequence_number(after, service.results()->last_sequence())};
+}
+
+Answer get_frame(Service& service, const Request&, const std::string&) {
+  return Response{200, "image/jpeg", service.frame_jpeg(), {}};
+}
+
+Answer get_jobs(Service& service, const Request&, const std::string&) {
+  json jobs = json::array();
+  for (const JobStatus& job : service.jobs().list()) jobs.push_back(to_json(job));
+  return reply({{"jobs", std::move(jobs)}});
+}
+
+JobStatus job_or_404(const std::optional<JobStatus>& job, const std::string& id) {
+  if (!job) throw RequestError(404, "there is no job \"" + id + "\"", "GET /v1/jobs lists them");
+  return *job;
+}
+
+Answer get_job(Service& service, const Request&, const std::string& id) {
+  return reply(to_json(job_or_404(service.jobs().find(id), id)));
+}
+
+Answer cancel_job(Service& service, const Request&, const std::string& id) {
+  return reply(to_json(job_or_404(service.jobs().cancel(id), id)), 202);
+}
+
+Response started(const JobStatus& job) {
+  Response response = reply(to_json(job), 202);
+  response.headers["Location"] = "/v1/jobs/" + job.id;
+  return response;
+}
+
+/// A plan that stands in the request itself: {"axes": [{"axis": "table", "from": 0, "to": 360, "count":
+/// 36}]}.
+Plan plan_from(const json& given, const Service& service) {
+  Plan plan{"request", {}};
+  for (const json& row : given.at("axes")) {
+    PlanAxis axis{row.at("axis").get<std::string>(), {}};
+    if (row.contains("at")) {
+      axis.positions = row.at("at").get<std::vector<double>>();
+    } else {
+      for (const Dof& dof : service.config().dofs())
+        if (dof.name == axis.axis)
+          axis.positions = spaced_positions(dof, row.at("from").get<double>(), row.at("to").get<double>(),
+                                            row.at("count").get<int>());
+    }
+    plan.axes.push_back(std::move(axis));
+  }
+  return plan;
+}
+
+Answer post_acquisition(Service& service, const Request& request, const std::string&) {
+  const json body = body_object(request, {"object", "plan"});
+  const json plan = body.value("plan", json("default"));
+  const std::string object = body.at("object").get<std::string>();
+  return started(service.acquire(
+      object, plan.is_string() ? service.plan(plan.get<std::string>()) : plan_from(plan, service)));
+}
+
+/// Everything the API offers.
+constexpr Route routes[] = {
+    {"GET", "/v1/status", Access::read, get_status},
+    {"GET", "/v1/objects", Access::read, get_objects},
+    {"GET", "/v1/results/latest", Access::read, get_latest},
+    {"GET", "/v1/results", Access::read, get_results},
+    {"GET", "/v1/frame.jpg", Access::read, get_frame},
+    {"GET", "/v1/jobs", Access::read, get_jobs},
+    {"GET", "/v1/jobs/{id}", Access::read, get_job},
+    {"DELETE", "/v1/jobs/{id}", Access::control, cancel_job},
+    {"POST", "/v1/acquisitions", Access::control, post_acquisition},
+    {"GET", "/v1/acquisitions/{id}", Access::read, get_job},
+    {"DELETE", "/v1/acquisitions/{id}", Access::control, cancel_job},
+};
+
+/// Whether `path` is what the route's path stands for; fills `id`.
+bool matches(std::string_view pattern, std::string_view path, std::string& id) {
+  constexpr std::string_view place = "{id}";
+  if (!pattern.ends_with(place)) return pattern == path;
+  pattern.remove_suffix(place.size());
+  if (!path.starts_with(pattern) || path.size() == pattern.size()) return false;
+  id = path.substr(pattern.size());
+  return id.find('/') == std::string::npos;
+}
+
+Answer answer(Service& service, const Request& request) {
+  std::vector<std::string_view> methods;
+  for (const Route& route : routes) {
+    std::string id;
+    if (!matches(route.path, request.path, id)) continue;
+    if (route.method != request.method) {
+      methods.push_back(route.method);
+      continue;
+    }
+    if (route.needs == Access::control && request.access != Access::control)
+      throw RequestError(403, "this socket is for reading", "commands go to control.sock beside it");
+    return route.act(service, request, id);
+  }
+  if (methods.empty())
+    throw RequestError(404, "there is no " + request.path, "GET /v1/status is a good start");
+  Response refused = error_response(405, request.method + " is not for " + request.path,
+                                    fmt::format("allowed: {}", fmt::join(methods, ", ")));
+  refused.headers["Allow"] = fmt::format("{}", fmt::join(methods, ", "));
+  return refused;
+}
+
+}  // namespace
+
+Handler make_handler(Service& service) {
+  return [&service](const Request& request) -> Answer {
+    try {
+      return answer(service, request);
+    } catch (...) {
+      return error_response(std::current_exception());
+    }
+  };
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,166 @@
+/// The service eigenposed. `run` is its whole life, top to bottom.
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <pthread.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include "config/config.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "daemon/api/routes.h"
+#include "daemon/api/server.h"
+#include "daemon/api/unix_socket.h"
+#include "daemon/devices.h"
+#include "daemon/service.h"
+
+namespace eigenpose {
+namespace {
+
+struct Options {
+  std::filesystem::path config = "/etc/eigenpose/eigenposed.toml";
+  std::filesystem::path runtime_dir;  ///< empty: the configuration's
+  std::filesystem::path state_dir;
+  bool check_only = false;
+};
+
+/// SIGTERM and SIGINT end the service, and only where it waits for them.
+class Signals {
+ public:
+  Signals() {
+    sigemptyset(&ending_);
+    sigaddset(&ending_, SIGTERM);
+    sigaddset(&ending_, SIGINT);
+    // Before any other thread exists, so that all of them inherit it.
+    pthread_sigmask(SIG_BLOCK, &ending_, nullptr);
+    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGHUP, SIG_IGN);
+  }
+  /// Waits until the service should end. Meanwhile tells systemd's watchdog that it lives.
+  [[nodiscard]] int wait() const {
+    std::uint64_t watchdog_us = 0;
+    const bool watched = ::sd_watchdog_enabled(0, &watchdog_us) > 0;
+    const std::uint64_t period_us = watched ? watchdog_us / 3 : 60'000'000;
+    for (;;) {
+      const timespec period{static_cast<time_t>(period_us / 1'000'000),
+                            static_cast<long>(period_us % 1'000'000 * 1000)};
+      const int signal = ::sigtimedwait(&ending_, nullptr, &period);
+      if (signal > 0) return signal;
+      if (watched) ::sd_notify(0, "WATCHDOG=1");
+    }
+  }
+
+ private:
+  sigset_t ending_{};
+};
+
+void start_log(const std::string& level) {
+  auto log = spdlog::stderr_logger_mt("eigenposed");
+  // journald stamps the time itself; a terminal and a file do not.
+  const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
+  log->set_pattern(journal ? "level=%l %v" : "time=%Y-%m-%dT%H:%M:%S.%e level=%l %v");
+  log->set_level(spdlog::level::from_str(level));
+  log->flush_on(spdlog::level::info);
+  spdlog::set_default_logger(std::move(log));
+}
+
+/// Makes a folder that only the service and its group enter, unless it is there.
+void make_folder(const std::filesystem::path& folder, const std::string& key) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder))
+    throw FileError(folder,
+                    "the folder cannot be made: " + error.message() + ": change " + key + " in [daemon]");
+}
+
+ServerOptions server_options(const ApiOptions& api) {
+  ServerOptions options;
+  options.max_connections = api.max_connections;
+  options.max_body = static_cast<std::size_t>(api.max_body_kib) * 1024;
+  options.request_timeout = api.request_timeout;
+  return options;
+}
+
+void run(const Options& options) {
+  Config config = read_config(options.config);
+  if (!options.runtime_dir.empty())
+    config.daemon.runtime_dir = std::filesystem::absolute(options.runtime_dir);
+  if (!options.state_dir.empty()) config.daemon.state_dir = std::filesystem::absolute(options.state_dir);
+  if (options.check_only) {
+    std::printf("%s: good\n", options.config.c_str());
+    return;
+  }
+  const Signals signals;
+  start_log(config.daemon.log_level);
+  spdlog::info("event=starting version={} config={}", EIGENPOSE_VERSION, config.file.string());
+  make_folder(config.daemon.runtime_dir, "runtime_dir");
+  make_folder(config.daemon.state_dir, "state_dir");
+  // A second daemon is refused here, before any device is opened.
+  const UnixSocket results(config.results_socket(), config.api.results_mode, config.api.results_group);
+  const UnixSocket control(config.control_socket(), config.api.control_mode, config.api.control_group);
+  const SteadyClock clock;
+  Service service(config, make_devices(config, clock), clock);
+  Server server(server_options(config.api), make_handler(service));
+  service.results()->on_publish([&server] { server.notify(); });
+  server.listen(results, Access::read);
+  server.listen(control, Access::control);
+  server.start();
+  spdlog::info("event=ready results={} control={}", results.path().string(), control.path().string());
+  ::sd_notify(0, "READY=1");
+
+  const int signal = signals.wait();
+  ::sd_notify(0, "STOPPING=1");
+  spdlog::info("event=stopping signal={}", signal);
+  service.results()->on_publish({});
+  // Leaving the scope ends the rest in reverse: clients, jobs, motion, devices, sockets.
+}
+
+int main_with_words(int argc, char** argv) {
+  Options options;
+  CLI::App app(
+      "Eigenpose's service: acquires and learns objects, watches the table, and answers on local sockets.",
+      "eigenposed");
+  app.set_version_flag("--version", std::string("eigenposed ") + EIGENPOSE_VERSION);
+  app.add_option("--config", options.config, "Configuration file")->capture_default_str()->type_name("FILE");
+  app.add_option("--runtime-dir", options.runtime_dir,
+                 "Folder of the sockets, in the place of the configured one")
+      ->type_name("DIR");
+  app.add_option("--state-dir", options.state_dir,
+                 "Folder of image sets and model, in the place of the configured one")
+      ->type_name("DIR");
+  app.add_flag("--check-config", options.check_only,
+               "Only say whether the configuration is good; open nothing");
+  app.footer(
+      "Exit code: 0 stopped on SIGTERM or SIGINT, 1 could not start (one line on stderr says why), 2 line "
+      "not "
+      "understood.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "eigenposed: %s; 'eigenposed --help' explains\n", error.what());
+    return 2;
+  }
+  try {
+    run(options);
+    if (!options.check_only) spdlog::info("event=stopped");
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "eigenposed: %s\n", error.what());
+    return 1;
+  }
+}
+
+}  // namespace
+}  // namespace eigenpose
+
+int main(int argc, char** argv) {
+  return eigenpose::main_with_words(argc, argv);
+}
