@@ -19,9 +19,9 @@ struct Eigenspace {
   [[nodiscard]] Eigen::Index length() const { return basis.rows(); }      ///< N
   [[nodiscard]] Eigen::Index components() const { return basis.cols(); }  ///< K
 
-  /// basisᵀ (appearance − mean): K numbers. @pre appearance.size() == N.
+  /// basisᵀ (appearance − mean): K numbers. @throws std::invalid_argument unless appearance.size() == N.
   [[nodiscard]] Eigen::VectorXf project(const Eigen::Ref<const Eigen::VectorXf>& appearance) const;
-  /// mean + basis · point: N numbers. @pre point.size() == K.
+  /// mean + basis · point: N numbers. @throws std::invalid_argument unless point.size() == K.
   [[nodiscard]] Eigen::VectorXf reconstruct(const Eigen::Ref<const Eigen::VectorXf>& point) const;
 };
 

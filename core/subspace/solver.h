@@ -22,7 +22,7 @@ struct SolverOptions {
   std::size_t components = 20;
   /// If set (0…1], K is the smallest number that keeps this share of the scatter, and `components` its upper
   /// limit.
-  std::optional<double> energy;
+  std::optional<double> energy = std::nullopt;
   /// Threads for the products; 0 means all cores. The result does not depend on it.
   unsigned threads = 0;
   /// Memory for tiles and the Gram matrix together, bytes; 0 means no limit.
@@ -33,7 +33,9 @@ struct SolverReport {
   std::string solver;          ///< the one that ran
   std::size_t components = 0;  ///< K reached
   double energy = 0.0;         ///< share of the scatter kept
-  /// Largest ‖Q e − λ e‖ / (λ_k − λ_{k+1}): bounds the sine of the angle between found and true eigenvector.
+  /// ‖Q E − E Λ‖ / (λ_K − λ_{K+1}): bounds the sine of the largest angle between found and true subspace.
+  /// Where the two eigenvalues are equal the cut is one of many (the note says so), and it is ‖Q E − E Λ‖ /
+  /// λ_K.
   double residual_over_gap = 0.0;
   bool exact_integers = false;  ///< the Gram matrix was computed in integers
   Duration gram_time{};

@@ -1,0 +1,102 @@
+#include "core/subspace/back_projection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "core/base/parallel.h"
+#include "core/subspace/kernels.h"
+#include "core/subspace/view_reader.h"
+#include "core/subspace/work_meter.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr std::size_t kPixels = 128;  ///< pixels that one job works on; a multiple of 8
+constexpr std::size_t kDepth = 32;  ///< views packed at once; strips of a streamed source are multiples of it
+
+constexpr double kSignTolerance = 1e-4;  ///< share of the largest entry: see Eigenspace's invariants
+
+/// out += X · weights for the views of `block`, whose first one has row `first` of `weights`.
+void add_block(const ViewBlock& block, const Eigen::MatrixXd& weights, std::size_t first, unsigned threads,
+               Eigen::MatrixXd& out) {
+  const Kernels& kernels = best_kernels();
+  const auto rows = static_cast<std::size_t>(weights.cols());
+  const auto stride = static_cast<std::size_t>(weights.rows());
+  parallel_for((block.length + kPixels - 1) / kPixels, threads, [&](std::size_t job) {
+    const std::size_t pixel = job * kPixels;
+    const std::size_t n = std::min(kPixels, block.length - pixel);
+    std::vector<double> packed(kDepth * kPixels, 0.0);
+    std::vector<double> sums(rows * kPixels, 0.0);
+    // The running sums continue, so that strips do not show in the result.
+    for (std::size_t r = 0; r < rows; ++r) {
+      std::copy_n(out.data() + r * block.length + pixel, n, sums.data() + r * kPixels);
+    }
+    for (std::size_t view = 0; view < block.count; view += kDepth) {
+      const std::size_t depth = std::min(kDepth, block.count - view);
+      for (std::size_t v = 0; v < depth; ++v) block.widen(view + v, pixel, n, packed.data() + v * kPixels);
+      kernels.combine(weights.data() + first + view, stride, rows, packed.data(), kPixels, depth, kPixels,
+                      sums.data(), kPixels);
+    }
+    for (std::size_t r = 0; r < rows; ++r) {
+      std::copy_n(sums.data() + r * kPixels, n, out.data() + r * block.length + pixel);
+    }
+  });
+}
+
+}  // namespace
+
+Eigen::MatrixXd back_project(const AppearanceSource& source, const Eigen::VectorXd& norms,
+                             const Eigen::MatrixXd& weights, const BackProjectionOptions& options,
+                             const Progress& progress, std::stop_token stop) {
+  const std::size_t count = source.count();
+  const Eigen::MatrixXd scaled = norms.cwiseInverse().asDiagonal() * weights;
+  ViewReader reader(source);
+  std::size_t strip = reader.views_in(options.tile_memory);
+  if (!reader.resident() && strip > kDepth) strip -= strip % kDepth;
+  if (reader.resident()) strip = 16 * kDepth;  // only to hear of stop requests now and then
+  WorkMeter meter(progress, std::move(stop), "back-projection", count);
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(source.length()), weights.cols());
+  for (std::size_t first = 0; first < count; first += strip) {
+    const std::size_t n = std::min(strip, count - first);
+    add_block(reader.read(first, n), scaled, first, options.threads, out);
+    meter.finished(n);
+  }
+  return out;
+}
+
+Eigenspace eigenspace_from_gram(const AppearanceSource& source, const Eigen::VectorXd& norms,
+                                const Eigen::VectorXd& values, const Eigen::MatrixXd& vectors,
+                                double total_scatter, const BackProjectionOptions& options,
+                                const Progress& progress, std::stop_token stop) {
+  const Eigen::Index components = values.size();
+  Eigen::MatrixXd weights(vectors.rows(), components + 1);
+  weights.leftCols(components) = vectors * values.cwiseSqrt().cwiseInverse().asDiagonal();
+  weights.col(components).setConstant(1.0 / static_cast<double>(vectors.rows()));
+  Eigen::MatrixXd columns = back_project(source, norms, weights, options, progress, std::move(stop));
+  const Eigen::VectorXd mean = columns.col(components);
+  columns.conservativeResize(Eigen::NoChange, components);
+  return finished_eigenspace(mean, std::move(columns), values, total_scatter);
+}
+
+Eigenspace finished_eigenspace(const Eigen::VectorXd& mean, Eigen::MatrixXd basis,
+                               const Eigen::VectorXd& values, double total_scatter) {
+  // Cholesky of the small product is Gram-Schmidt in the order of the columns; they are almost orthonormal
+  // already.
+  const Eigen::MatrixXd overlap = basis.transpose() * basis;
+  const Eigen::LLT<Eigen::MatrixXd> factor(overlap);
+  factor.matrixU().solveInPlace<Eigen::OnTheRight>(basis);
+  for (Eigen::Index k = 0; k < basis.cols(); ++k) {
+    // Where several entries are as large up to rounding, the first of them decides on every machine.
+    const double large = basis.col(k).cwiseAbs().maxCoeff() * (1.0 - kSignTolerance);
+    Eigen::Index first = 0;
+    while (std::abs(basis(first, k)) < large) ++first;
+    if (basis(first, k) < 0.0) basis.col(k) = -basis.col(k);
+  }
+  return {mean.cast<float>(), basis.cast<float>(), values, total_scatter};
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,47 @@
+#pragma once
+
+/// The Gram matrix of a set of appearances (Murakami and Kumar; eq. 21): exact where the views are 8-bit.
+
+#include <cstddef>
+#include <stop_token>
+
+#include <Eigen/Core>
+
+#include "core/base/progress.h"
+#include "core/subspace/appearance_source.h"
+#include "core/subspace/kernels.h"
+#include "core/subspace/view_reader.h"
+
+namespace eigenpose {
+
+struct GramOptions {
+  unsigned threads = 0;         ///< 0 means all cores; the result does not depend on it
+  std::size_t tile_memory = 0;  ///< bytes for views read from a source that is not resident; 0 means no limit
+  const Kernels* kernels = nullptr;  ///< null means the fastest of this machine
+};
+
+/// out(i, j) = ⟨aᵢ, bⱼ⟩ for all views of the two blocks: exact integers for bytes, sums in double for floats.
+/// Every entry depends on its two views alone: not on threads, tiles, order, or (in floats too) the kernels.
+/// @param out a.count × b.count. @param lower_only the blocks are the same one: leave entries above the
+/// diagonal alone.
+/// @pre both blocks are bytes or both are floats, of one length.
+void inner_products(const ViewBlock& a, const ViewBlock& b, bool lower_only, const GramOptions& options,
+                    Eigen::Ref<Eigen::MatrixXd> out, const Progress& progress = {},
+                    std::stop_token stop = {});
+
+/// All inner products of a source's views, unscaled where they are bytes: M × M, full and symmetric. Cost
+/// M²N/2 multiplications, 8M² bytes, and the views once if `tile_memory` holds them all; if it holds the
+/// share 1/s of them, about (s+1)/2 times. @throws std::invalid_argument when `tile_memory` holds fewer than
+/// two views, Interrupted.
+Eigen::MatrixXd gram_matrix(const AppearanceSource& source, const GramOptions& options,
+                            const Progress& progress = {}, std::stop_token stop = {});
+
+/// ‖xⱼ‖ of every view, from the diagonal, for bytes; ones for floats, which are scaled already.
+/// @throws std::invalid_argument naming the view without energy.
+Eigen::VectorXd view_norms(const Eigen::MatrixXd& gram, bool bytes);
+
+/// Turns inner products into those of the centred unit-energy appearances, in place: J D⁻¹ G D⁻¹ J with D the
+/// norms and J = I − 11ᵀ/M. @return its trace: the total scatter.
+double normalize_and_center(Eigen::MatrixXd& gram, const Eigen::VectorXd& norms, unsigned threads);
+
+}  // namespace eigenpose

@@ -1,0 +1,56 @@
+#pragma once
+
+/// The solvers behind `solve_eigenspace`, one function each. Internal to the layer.
+
+#include <cstddef>
+#include <stop_token>
+
+#include <Eigen/Core>
+
+#include "core/base/progress.h"
+#include "core/subspace/appearance_source.h"
+#include "core/subspace/eigenspace.h"
+#include "core/subspace/solver.h"
+
+namespace eigenpose::detail {
+
+/// What a solver works on. `options.components` is at most M − 1 already.
+struct SolverTask {
+  const AppearanceSource& source;
+  const SolverOptions& options;
+  const Progress& progress;
+  std::stop_token stop;
+};
+
+Eigenspace solve_gram(const SolverTask& task, SolverReport& report);
+Eigenspace solve_dense(const SolverTask& task, SolverReport& report);
+
+/// Memory that the Gram solver needs beside the tiles, bytes.
+std::size_t gram_solver_memory(std::size_t count, std::size_t length, std::size_t components);
+
+/// Eigenvalues at most this are rounding of the M × M products of unit-energy views.
+double rounding_of_scatter(std::size_t count);
+
+/// How many of the descending `values` to keep: all, or the fewest that keep `energy` of the scatter.
+Eigen::Index components_for(const Eigen::VectorXd& values, double total_scatter,
+                            const SolverOptions& options);
+
+/// The leading eigenpairs that a solver found, before the cut by energy.
+struct EigenPairs {
+  Eigen::VectorXd values;     ///< descending, positive
+  Eigen::MatrixXd vectors;    ///< orthonormal columns
+  Eigen::VectorXd residuals;  ///< ‖Q e − λ e‖, one a pair
+  double next_value = 0.0;    ///< the eigenvalue after the last one
+};
+
+/// By a full eigen-solve of a symmetric matrix in double: the leading `wanted`, those above `noise`.
+EigenPairs full_eigenpairs(const Eigen::MatrixXd& matrix, Eigen::Index wanted, double noise);
+
+/// Fills the report's residual over gap for the first `kept` pairs, notes a tie at the cut, and refuses an
+/// inaccurate answer. @throws Error.
+void judge(const EigenPairs& pairs, Eigen::Index kept, SolverReport& report);
+
+/// @throws Error when there is nothing to span: all views are equal.
+void check_rank(Eigen::Index rank);
+
+}  // namespace eigenpose::detail

@@ -1,0 +1,21 @@
+#include "core/subspace/work_meter.h"
+
+#include <string>
+#include <utility>
+
+#include "core/base/error.h"
+
+namespace eigenpose {
+
+WorkMeter::WorkMeter(const Progress& progress, std::stop_token stop, std::string_view stage,
+                     std::size_t total)
+    : progress_(progress), stop_(std::move(stop)), stage_(stage), total_(total) {}
+
+void WorkMeter::finished(std::size_t units) {
+  if (stop_.stop_requested()) throw Interrupted("learning was interrupted while " + std::string(stage_));
+  const std::lock_guard lock(mutex_);
+  done_ += units;
+  if (progress_) progress_({stage_, done_, total_});
+}
+
+}  // namespace eigenpose

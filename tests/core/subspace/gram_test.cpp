@@ -1,0 +1,108 @@
+#include "core/subspace/gram.h"
+
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/subspace/memory_source.h"
+#include "tests/core/subspace/subspace_samples.h"
+
+namespace eigenpose {
+namespace {
+
+/// The same views through a source that must be read.
+class StreamedSource final : public AppearanceSource {
+ public:
+  explicit StreamedSource(const AppearanceSource& inner) : inner_(inner) {}
+  [[nodiscard]] std::size_t count() const override { return inner_.count(); }
+  [[nodiscard]] std::size_t length() const override { return inner_.length(); }
+  [[nodiscard]] bool has_bytes() const override { return inner_.has_bytes(); }
+  void read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const override { inner_.read(first, tile); }
+  void read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const override {
+    inner_.read_bytes(first, n, tile);
+  }
+
+ private:
+  const AppearanceSource& inner_;
+};
+
+TEST(Gram, IsTheExactInnerProductsOfBytes) {
+  // 201 views: two full tiles and a part; 1300 numbers: one full k-block and a part.
+  const auto bytes = test::smooth_views(201, 1300, 1);
+  const ByteSource source(bytes, 1300);
+  const Eigen::MatrixXd gram = gram_matrix(source, {});
+  for (const auto& [i, j] : {std::pair{0, 0}, {200, 3}, {3, 200}, {100, 99}, {95, 96}}) {
+    std::int64_t expected = 0;
+    for (std::size_t k = 0; k < 1300; ++k) {
+      expected +=
+          bytes[static_cast<std::size_t>(i) * 1300 + k] * bytes[static_cast<std::size_t>(j) * 1300 + k];
+    }
+    EXPECT_EQ(gram(i, j), static_cast<double>(expected)) << i << ' ' << j;
+  }
+  EXPECT_EQ(gram, gram.transpose());
+}
+
+TEST(Gram, IsTheSameBitForBitWithAnyThreadsTilesAndInstructions) {
+  const auto bytes = test::smooth_views(210, 1111, 2);
+  const ByteSource byte_source(bytes, 1111);
+  const FloatSource float_source(test::views_of_rank(1111, 210, 20, 3));
+  for (const AppearanceSource* source : {static_cast<const AppearanceSource*>(&byte_source),
+                                         static_cast<const AppearanceSource*>(&float_source)}) {
+    const Eigen::MatrixXd one = gram_matrix(*source, {1, 0, nullptr});
+    EXPECT_EQ(one, gram_matrix(*source, {3, 0, nullptr})) << "threads";
+    EXPECT_EQ(one, gram_matrix(*source, {2, 0, &portable_kernels()})) << "instructions";
+    const StreamedSource streamed(*source);
+    EXPECT_EQ(one, gram_matrix(streamed, {2, 0, nullptr})) << "read whole";
+    EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 60, nullptr})) << "read in tiles";
+    EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 2, nullptr})) << "read two views at a time";
+  }
+}
+
+TEST(Gram, RefusesAMemoryLimitThatHoldsNoTwoViews) {
+  const auto bytes = test::smooth_views(5, 100, 1);
+  const ByteSource source(bytes, 100);
+  const StreamedSource streamed(source);
+  EXPECT_THROW(gram_matrix(streamed, {1, 150, nullptr}), std::invalid_argument);
+  EXPECT_THROW(gram_matrix(streamed, {1, 50, nullptr}), std::invalid_argument);
+}
+
+TEST(Gram, NamesTheBlackView) {
+  auto bytes = test::smooth_views(5, 100, 1);
+  std::fill_n(bytes.begin() + 300, 100, std::uint8_t{0});
+  const ByteSource source(bytes, 100);
+  try {
+    view_norms(gram_matrix(source, {}), true);
+    FAIL() << "accepted a view without energy";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("view 3"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Gram, CentersLikeCenteredViews) {
+  const auto bytes = test::smooth_views(40, 500, 4);
+  const ByteSource source(bytes, 500);
+  Eigen::MatrixXd gram = gram_matrix(source, {});
+  const double total = normalize_and_center(gram, view_norms(gram, true), 2);
+  Eigen::MatrixXd views(500, 40);
+  for (Eigen::Index j = 0; j < 40; ++j) {
+    for (Eigen::Index k = 0; k < 500; ++k) views(k, j) = bytes[static_cast<std::size_t>(j * 500 + k)];
+    views.col(j).normalize();
+  }
+  views.colwise() -= Eigen::VectorXd(views.rowwise().mean());
+  // Entries of order one, rounded a few times in double.
+  EXPECT_LT((gram - views.transpose() * views).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_NEAR(total, views.squaredNorm(), 1e-12);
+  EXPECT_EQ(gram, gram.transpose());
+}
+
+TEST(Gram, StopsOnRequest) {
+  const auto bytes = test::smooth_views(300, 64, 5);
+  const ByteSource source(bytes, 64);
+  std::stop_source stop;
+  const auto at_second = [&](const ProgressUpdate& update) {
+    if (update.done == 2) stop.request_stop();
+  };
+  EXPECT_THROW(gram_matrix(source, {1, 0, nullptr}, at_second, stop.get_token()), Interrupted);
+}
+
+}  // namespace
+}  // namespace eigenpose

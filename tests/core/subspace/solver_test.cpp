@@ -1,0 +1,192 @@
+#include "core/subspace/solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/subspace/memory_source.h"
+#include "tests/core/subspace/subspace_samples.h"
+
+namespace eigenpose {
+namespace {
+
+/// Owns its bytes, so that one value is a whole set.
+class OwnedBytes final : public AppearanceSource {
+ public:
+  OwnedBytes(std::vector<std::uint8_t> bytes, std::size_t length)
+      : bytes_(std::move(bytes)), source_(bytes_, length) {}
+  [[nodiscard]] std::size_t count() const override { return source_.count(); }
+  [[nodiscard]] std::size_t length() const override { return source_.length(); }
+  [[nodiscard]] bool has_bytes() const override { return true; }
+  void read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const override { source_.read(first, tile); }
+  void read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const override {
+    source_.read_bytes(first, n, tile);
+  }
+  [[nodiscard]] const std::uint8_t* resident_bytes() const override { return bytes_.data(); }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+  ByteSource source_;
+};
+
+struct Sample {
+  friend void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
+
+  std::string name;
+  std::function<std::unique_ptr<AppearanceSource>()> make;
+  std::size_t components;           ///< asked for
+  std::size_t expected_components;  ///< what the views span, at most that
+};
+
+std::unique_ptr<AppearanceSource> bytes_of(std::size_t count, std::size_t length) {
+  return std::make_unique<OwnedBytes>(test::smooth_views(count, length, 11), length);
+}
+
+std::vector<Sample> samples() {
+  return {
+      {"FewerViewsThanPixels", [] { return bytes_of(90, 700); }, 10, 10},
+      {"MoreViewsThanPixels", [] { return bytes_of(400, 60); }, 10, 10},
+      {"ManyViews", [] { return bytes_of(500, 900); }, 20, 20},
+      {"EveryDirection", [] { return bytes_of(12, 300); }, 40, 11},
+      {"RankDeficient", [] { return std::make_unique<FloatSource>(test::views_of_rank(400, 300, 7, 5)); }, 20,
+       8},
+      {"RepeatedEigenvalues", [] { return std::make_unique<FloatSource>(test::turned_views(720, 360, 6)); },
+       20, 20},
+      {"TwoViews", [] { return bytes_of(2, 50); }, 20, 1},
+  };
+}
+
+class EverySolver : public testing::TestWithParam<std::tuple<std::string, Sample>> {};
+
+/// Float rounding of the basis: 6e-8 an entry, relative; in degrees, with room for the comparison.
+constexpr double kFloatAngleDeg = 5e-5;
+
+TEST_P(EverySolver, FindsTheSubspaceOfTheDenseOracle) {
+  const auto& [name, sample] = GetParam();
+  const auto source = sample.make();
+  SolverReport report;
+  const Eigenspace found =
+      solve_eigenspace(*source, {.solver = name, .components = sample.components}, &report);
+  const Eigenspace oracle = solve_eigenspace(*source, {.solver = "dense", .components = sample.components});
+  ASSERT_EQ(found.components(), oracle.components());
+  EXPECT_LE(report.residual_over_gap, 1e-3);
+  EXPECT_EQ(report.components, static_cast<std::size_t>(found.components()));
+  EXPECT_EQ(report.components, sample.expected_components);
+  const double bound_deg = report.residual_over_gap * 57.3 + kFloatAngleDeg;
+  EXPECT_LT(test::largest_angle_deg(found.basis, oracle.basis), bound_deg);
+  // Eigenvalue errors are quadratic in the residual; sums of unit-energy views in double otherwise.
+  EXPECT_LT((found.eigenvalues - oracle.eigenvalues).cwiseAbs().maxCoeff(), 1e-6 * oracle.eigenvalues[0]);
+  EXPECT_NEAR(found.total_scatter, oracle.total_scatter, 1e-9 * static_cast<double>(source->count()));
+  EXPECT_LT((found.mean - oracle.mean).cwiseAbs().maxCoeff(), 1e-6F);
+}
+
+TEST_P(EverySolver, KeepsTheInvariantsOfAnEigenspace) {
+  const auto& [name, sample] = GetParam();
+  const auto source = sample.make();
+  const Eigenspace space = solve_eigenspace(*source, {.solver = name, .components = sample.components});
+  const Eigen::MatrixXf overlap = space.basis.transpose() * space.basis;
+  EXPECT_LT((overlap - Eigen::MatrixXf::Identity(overlap.rows(), overlap.cols())).cwiseAbs().maxCoeff(),
+            1e-5F);
+  for (Eigen::Index k = 0; k < space.components(); ++k) {
+    EXPECT_GT(space.eigenvalues[k], 0.0);
+    EXPECT_GE(space.eigenvalues[std::max<Eigen::Index>(k - 1, 0)], space.eigenvalues[k]);
+    const float large = space.basis.col(k).cwiseAbs().maxCoeff() * (1.0F - 1e-4F);
+    Eigen::Index first = 0;
+    while (std::abs(space.basis(first, k)) < large) ++first;
+    EXPECT_GT(space.basis(first, k), 0.0F);
+  }
+  EXPECT_LE(space.eigenvalues.sum(), space.total_scatter * (1.0 + 1e-9));
+}
+
+TEST_P(EverySolver, GivesTheSameBitsOnAnyNumberOfThreads) {
+  const auto& [name, sample] = GetParam();
+  const auto source = sample.make();
+  const Eigenspace one =
+      solve_eigenspace(*source, {.solver = name, .components = sample.components, .threads = 1});
+  const Eigenspace three =
+      solve_eigenspace(*source, {.solver = name, .components = sample.components, .threads = 3});
+  EXPECT_EQ(one.basis, three.basis);
+  EXPECT_EQ(one.mean, three.mean);
+  EXPECT_EQ(one.eigenvalues, three.eigenvalues);
+}
+
+INSTANTIATE_TEST_SUITE_P(Solvers, EverySolver,
+                         testing::Combine(testing::Values("auto", "gram"), testing::ValuesIn(samples())),
+                         [](const auto& drawn) {
+                           std::string name = std::get<0>(drawn.param) + std::get<1>(drawn.param).name;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST(Solver, ProjectsAndReconstructsWithinTheKeptEnergy) {
+  const auto source = bytes_of(80, 300);
+  const Eigenspace space = solve_eigenspace(*source, {.components = 79});
+  Eigen::MatrixXf views(300, 80);
+  source->read(0, views);
+  const Eigen::VectorXf point = space.project(views.col(17));
+  ASSERT_EQ(point.size(), space.components());
+  // All directions are kept, so a learned view comes back up to float rounding.
+  EXPECT_LT((space.reconstruct(point) - views.col(17)).norm(), 1e-5F);
+  EXPECT_THROW((void)space.project(Eigen::VectorXf::Zero(299)), std::invalid_argument);
+  EXPECT_THROW((void)space.reconstruct(Eigen::VectorXf::Zero(5)), std::invalid_argument);
+}
+
+TEST(Solver, ChoosesTheFewestComponentsThatKeepTheEnergy) {
+  const auto source = bytes_of(300, 500);
+  const Eigenspace all = solve_eigenspace(*source, {.solver = "dense", .components = 60});
+  SolverReport report;
+  const Eigenspace some = solve_eigenspace(*source, {.components = 60, .energy = 0.9}, &report);
+  const Eigen::Index kept = some.components();
+  ASSERT_LT(kept, 60);
+  EXPECT_GE(all.eigenvalues.head(kept).sum(), 0.9 * all.total_scatter);
+  EXPECT_LT(all.eigenvalues.head(kept - 1).sum(), 0.9 * all.total_scatter);
+  EXPECT_GE(report.energy, 0.9);
+  EXPECT_EQ(solve_eigenspace(*source, {.components = 3, .energy = 1.0}).components(), 3)
+      << "components is the limit";
+}
+
+TEST(Solver, SaysSoWhereTheViewsSpanLessThanAskedFor) {
+  const FloatSource source(test::views_of_rank(200, 50, 4, 8));
+  SolverReport report;
+  solve_eigenspace(source, {.components = 20}, &report);
+  EXPECT_EQ(report.components, 5U);
+  EXPECT_NE(report.note.find("span 5 dimensions"), std::string::npos) << report.note;
+}
+
+TEST(Solver, ReportsExactIntegersForBytesOnly) {
+  SolverReport report;
+  solve_eigenspace(*bytes_of(30, 50), {.solver = "gram", .components = 3}, &report);
+  EXPECT_TRUE(report.exact_integers);
+  solve_eigenspace(FloatSource(test::views_of_rank(50, 30, 5, 1)), {.solver = "gram", .components = 3},
+                   &report);
+  EXPECT_FALSE(report.exact_integers);
+}
+
+TEST(Solver, RefusesWhatCannotBeLearned) {
+  const auto one = bytes_of(1, 50);
+  EXPECT_THROW(solve_eigenspace(*one, {}), std::invalid_argument);
+  const auto source = bytes_of(10, 50);
+  EXPECT_THROW(solve_eigenspace(*source, {.solver = "magic"}), std::invalid_argument);
+  EXPECT_THROW(solve_eigenspace(*source, {.components = 0}), std::invalid_argument);
+  EXPECT_THROW(solve_eigenspace(*source, {.energy = 1.5}), std::invalid_argument);
+  EXPECT_THROW(solve_eigenspace(*source, {.solver = "gram", .memory_limit = 100}), std::invalid_argument);
+  const OwnedBytes same(std::vector<std::uint8_t>(500, 7), 50);
+  EXPECT_THROW(solve_eigenspace(same, {}), Error) << "ten times the same view";
+}
+
+TEST(Solver, StopsOnRequest) {
+  const auto source = bytes_of(300, 200);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(solve_eigenspace(*source, {}, nullptr, {}, stop.get_token()), Interrupted);
+}
+
+}  // namespace
+}  // namespace eigenpose
