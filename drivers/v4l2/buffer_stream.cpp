@@ -22,8 +22,9 @@ void throw_device_error(const std::string& device, const std::string& operation,
     case EPERM:
       throw DeviceError(device, operation, cause + ": the user running this must be in the group 'video'");
     case EBUSY:
-      throw DeviceError(device, operation,
-                        cause + ": another program uses the camera; close it (fuser -v " + device + ")");
+      throw DeviceError(
+          device, operation,
+          cause + ": another program uses the camera; close it (fuser -v /dev/video* names it)");
     case ENOSPC:
       throw DeviceError(device, operation,
                         cause + ": the USB bus has no bandwidth left; use another port or a smaller mode");
@@ -96,8 +97,12 @@ std::optional<FilledBuffer> BufferStream::take() {
   v4l2_buffer buffer{};
   buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   buffer.memory = V4L2_MEMORY_MMAP;
+  const TimePoint now = clock_.now();
   const int error = device_.control(VIDIOC_DQBUF, &buffer);
-  if (error == EAGAIN) return std::nullopt;
+  if (error == EAGAIN) {
+    empty_at_ = now;
+    return std::nullopt;
+  }
   if (error != 0) fail("taking a frame", error);
   if (buffer.index >= mapped_.size()) fail("taking a frame", EPROTO);
   if (with_driver_ > 0) --with_driver_;
@@ -112,7 +117,7 @@ std::optional<FilledBuffer> BufferStream::take() {
   filled.stamp_is_start = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   filled.stamp = TimePoint(std::chrono::seconds(buffer.timestamp.tv_sec) +
                            std::chrono::microseconds(buffer.timestamp.tv_usec));
-  filled.queued = mapped.queued;
+  filled.not_before = std::max(mapped.queued, empty_at_);
   return filled;
 }
 

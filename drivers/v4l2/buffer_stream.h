@@ -22,7 +22,7 @@ struct FilledBuffer {
   bool stamp_is_start =
       false;  ///< of the start of exposure, the driver says; otherwise of the end of the frame
   TimePoint stamp{};
-  TimePoint queued{};  ///< when the buffer was last given to the driver
+  TimePoint not_before{};  ///< the buffer was filled after this, whatever the stamp says
 };
 
 /// Owns the buffers and the stream's being on. Refers to the device, which must outlive it. Lives on one
@@ -63,6 +63,7 @@ class BufferStream {
   std::vector<Mapped> mapped_;
   std::vector<std::uint32_t> refused_;
   unsigned with_driver_ = 0;
+  TimePoint empty_at_{};  ///< when no buffer was filled, last time we looked
 };
 
 /// The typed failure for errno of a call on a video device: DeviceLost when it means that the device is gone.

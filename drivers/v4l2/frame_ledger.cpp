@@ -26,10 +26,10 @@ std::uint64_t FrameLedger::number(std::uint32_t raw, TimePoint now) {
 
 TimePoint FrameLedger::exposure_start(const FilledBuffer& buffer, TimePoint now) const {
   const Duration slack = std::chrono::milliseconds(1);
-  // A frame may have begun before its buffer was queued, but not long before.
-  const TimePoint earliest = buffer.queued - 2 * timing_.interval - std::chrono::milliseconds(100);
+  // A stamp may lie before the buffer was seen empty, but not long before.
+  const TimePoint earliest = buffer.not_before - 2 * timing_.interval - std::chrono::milliseconds(100);
   const bool trusted = buffer.stamp_is_monotonic && buffer.stamp >= earliest && buffer.stamp <= now + slack;
-  const TimePoint stamp = trusted ? std::min(buffer.stamp, now) : buffer.queued;
+  const TimePoint stamp = trusted ? std::min(buffer.stamp, now) : buffer.not_before;
   const Duration readout = trusted && buffer.stamp_is_start ? Duration{} : timing_.interval;
   return stamp - readout - timing_.exposure.value_or(timing_.interval) -
          timing_.internal_frames * timing_.interval;

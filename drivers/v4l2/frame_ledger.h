@@ -28,8 +28,8 @@ class FrameLedger {
   std::uint64_t number(std::uint32_t raw, TimePoint now);
 
   /// The moment before which no photon of the frame fell. From the driver's stamp if that is monotonic and
-  /// lies in the time the driver had the buffer (some drivers stamp nonsense), else from when the buffer was
-  /// queued. From it are taken:
+  /// lies near the time the driver had the buffer (some drivers stamp nonsense), else from when the buffer
+  /// was last known to be empty. From it are taken:
   ///  - the readout, up to an interval, when the stamp is of the end of the frame;
   ///  - the exposure, also when the stamp claims to be of its start: uvcvideo claims so and stamps the first
   ///  packet received;

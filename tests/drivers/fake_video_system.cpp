@@ -488,6 +488,16 @@ void FakeVideoSystem::set_sequence(std::uint32_t next) {
   state_->sequence = next;
 }
 
+void FakeVideoSystem::rename_node(const std::string& path) {
+  const std::lock_guard lock(state_->mutex);
+  state_->camera.node.path = path;
+}
+
+void FakeVideoSystem::replace_modes(std::vector<FakeMode> modes) {
+  const std::lock_guard lock(state_->mutex);
+  state_->camera.modes = std::move(modes);
+}
+
 void FakeVideoSystem::at(TimePoint when, std::function<void()> action) {
   const std::lock_guard lock(state_->mutex);
   state_->script.emplace(when, std::move(action));

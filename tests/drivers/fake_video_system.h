@@ -77,6 +77,9 @@ class FakeVideoSystem final : public VideoSystem {
   /// The stream breaks: EIO until it is stopped.
   void break_stream();
   void set_sequence(std::uint32_t next);
+  /// The next `plug_in` brings the camera under another name, or with other modes.
+  void rename_node(const std::string& path);
+  void replace_modes(std::vector<FakeMode> modes);
   /// Called when time reaches `when`.
   void at(TimePoint when, std::function<void()> action);
 
