@@ -1,0 +1,49 @@
+#pragma once
+
+/// Draws the lab as a camera sees it, in linear light.
+///
+/// Rays are cast at triangle meshes (Embree); light is the lamp on the arm (diffuse and glossy reflection,
+/// soft shadows from its finite size), a dim room (with how open each point of a surface is), and what glossy
+/// surfaces mirror of it. On request one bounce of light between surfaces. Edges are cast four times.
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "sim/lab/scene_state.h"
+#include "sim/scene/model.h"
+
+namespace eigenpose::sim {
+
+struct RenderOptions {
+  int width = 640;       ///< pixels
+  int height = 480;      ///< pixels
+  unsigned threads = 1;  ///< 0: all cores
+  int bounce_rays = 0;   ///< rays a point for light from other surfaces; 0: none, 16 looks well
+};
+
+/// One thread at a time. The picture is a function of the scene alone, whatever the threads.
+class Renderer {
+ public:
+  /// @throws std::invalid_argument on a size out of 16…4096.
+  explicit Renderer(RenderOptions options);
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+  ~Renderer();
+
+  [[nodiscard]] const RenderOptions& options() const { return options_; }
+  /// CV_32FC3, blue, green, red, linear; 1 is what a white sheet on the table sends back under the full lamp,
+  /// about. Objects unknown to the catalogue are left out.
+  [[nodiscard]] cv::Mat render(const SceneState& scene);
+
+ private:
+  struct Setting;
+  [[nodiscard]] const cv::Mat& empty_stage(const Setting& setting);
+
+  RenderOptions options_;
+  cv::Mat empty_;                         ///< the picture without objects, kept as long as the light stands
+  std::unique_ptr<Setting> empty_light_;  ///< the light of `empty_`
+};
+
+}  // namespace eigenpose::sim

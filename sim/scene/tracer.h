@@ -1,0 +1,97 @@
+#pragma once
+
+/// Casts rays at the objects of one scene and says what light comes back. Used by the renderer.
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "sim/lab/scene_state.h"
+#include "sim/scene/model.h"
+
+namespace eigenpose::sim {
+
+/// The lamp as it shines at the moment.
+struct Light {
+  Vec3 position;
+  float level = 1.0F;
+
+  friend bool operator==(const Light&, const Light&) = default;
+};
+Light light_of(const SceneState& scene);
+
+/// A pinhole that looks at the table.
+class Pinhole {
+ public:
+  Pinhole(int width, int height);
+  [[nodiscard]] Vec3 position() const { return position_; }
+  /// Unit direction through a point of the picture, in pixels; (0, 0) is the outer corner of the first pixel.
+  [[nodiscard]] Vec3 direction(float x, float y) const;
+  /// Where a point is seen, in pixels.
+  void project(Vec3 point, float& x, float& y) const;
+  /// How many pixels a millimetre at this point takes.
+  [[nodiscard]] float pixels_per_mm(Vec3 point) const;
+
+ private:
+  Vec3 position_;
+  Vec3 forward_;
+  Vec3 right_;
+  Vec3 up_;
+  float focal_;  ///< pixels
+  float cx_;
+  float cy_;
+};
+
+/// A model at its place.
+struct Body {
+  std::shared_ptr<const Model> model;
+  float cosine = 1.0F;
+  float sine = 0.0F;
+  Vec3 offset;
+
+  [[nodiscard]] Vec3 to_local(Vec3 point) const { return direction_to_local(point - offset); }
+  [[nodiscard]] Vec3 direction_to_local(Vec3 d) const {
+    return {cosine * d.x + sine * d.y, -sine * d.x + cosine * d.y, d.z};
+  }
+  [[nodiscard]] Vec3 direction_to_world(Vec3 d) const {
+    return {cosine * d.x - sine * d.y, sine * d.x + cosine * d.y, d.z};
+  }
+  [[nodiscard]] Vec3 center() const { return direction_to_world(model->center()) + offset; }
+};
+/// The bodies of a scene, the hand last. Objects without a model are left out.
+std::vector<Body> bodies_of(const SceneState& scene);
+
+/// What one ray found.
+struct Sample {
+  Vec3 colour;
+  int what = -1;  ///< body and part as one number; −1: only table or backdrop
+};
+
+/// Immutable while it lives; any thread may sample.
+class Tracer {
+ public:
+  Tracer(const Pinhole& camera, Light light, std::vector<Body> bodies, int bounce_rays);
+
+  /// Four rays from the camera at once; near ones are cheaper.
+  [[nodiscard]] std::array<Sample, 4> sample(const std::array<Vec3, 4>& directions) const;
+  /// Table or backdrop, ignoring bodies except for their shadow.
+  [[nodiscard]] Vec3 stage_colour(Vec3 direction, bool shadowed) const;
+  [[nodiscard]] const std::vector<Body>& bodies() const { return bodies_; }
+
+ private:
+  struct Hit;
+  struct Rays;
+  void intersect(const Rays& rays, std::array<Hit, 4>& hits) const;
+  [[nodiscard]] Sample shade(const Hit& hit, Vec3 origin, Vec3 direction, bool with_bounce) const;
+  [[nodiscard]] Vec3 bounced(Vec3 point, Vec3 normal) const;
+  [[nodiscard]] Vec3 lamp_irradiance(Vec3 point) const;
+  [[nodiscard]] float lamp_visible(Vec3 point) const;
+
+  const Pinhole& camera_;
+  Light light_;
+  std::vector<Body> bodies_;
+  int bounce_rays_;
+  std::array<Vec3, 4> lamp_points_;
+};
+
+}  // namespace eigenpose::sim
