@@ -14,13 +14,17 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
-#include "daemon/cli/command.h"
+#include "daemon/cli/service_commands.h"
 
 namespace eigenpose::cli {
 namespace {
 
 /// The commands, in the order `--help` shows them.
 const std::vector<AddCommand> commands = {
+    add_acquire_command,  //
+    add_results_command,  //
+    add_status_command,   //
+    add_objects_command,  //
 };
 
 constexpr const char* about =
