@@ -20,8 +20,15 @@ struct ModelObject {
   Workspace workspace;
   Manifold manifold;                ///< in the universal eigenspace
   double rejection_distance = 0.0;  ///< a region farther than this is unknown
-  bool pose_observable = true;      ///< false where turning the object does not change its appearance
-  std::size_t views = 0;            ///< how many views it was learned from
+  /// Root mean square distance of views known to show this object, slightly moved and scaled: the yardstick
+  /// for "about as well".
+  double typical_distance = 0.0;
+  /// For each DOF: views left out of learning are found again at about their true value.
+  std::vector<bool> dof_observable = {};
+  /// dof_observable of the first DOF, which is the object's turn: false where turning the object does not
+  /// change its appearance, or makes it look the same several times a turn.
+  bool pose_observable = true;
+  std::size_t views = 0;  ///< how many views it was learned from
 };
 
 /// Where a model comes from; shown by `eigenpose inspect`.

@@ -14,23 +14,23 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
-#include "daemon/cli/service_commands.h"
+#include "daemon/cli/commands.h"
 
 namespace eigenpose::cli {
 namespace {
 
 /// The commands, in the order `--help` shows them.
 const std::vector<AddCommand> commands = {
-    add_acquire_command,  //
-    add_results_command,  //
-    add_status_command,   //
-    add_objects_command,  //
+    add_import_command,     //
+    add_learn_command,      //
+    add_recognize_command,  //
+    add_inspect_command,    //
+    add_evaluate_command,   //
 };
 
 constexpr const char* about =
     "Eigenpose learns objects from views taken all around them, and says which object stands before a camera "
-    "and how "
-    "it is turned.";
+    "and how it is turned.";
 
 constexpr const char* examples = R"(
 Start here:
@@ -102,8 +102,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", std::string("eigenpose ") + EIGENPOSE_VERSION);
   app.footer(examples);
   app.require_subcommand(1);
-  for (const AddCommand add : commands)
-    add(app, line);
+  for (const AddCommand add : commands) add(app, line);
 
   try {
     app.parse(argc, argv);

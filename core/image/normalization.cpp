@@ -1,0 +1,138 @@
+#include "core/image/normalization.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/image/resize_kernels.h"
+
+namespace eigenpose {
+namespace {
+
+/// Brightness of a colour pixel: the weights of ITU-R BT.601.
+float luma(float blue, float green, float red) {
+  return 0.114F * blue + 0.587F * green + 0.299F * red;
+}
+
+}  // namespace
+
+int appearance_bands(const NormalizationOptions& options) {
+  return options.color ? 3 : 1;
+}
+
+std::size_t appearance_length(const NormalizationOptions& options) {
+  return static_cast<std::size_t>(options.size) * static_cast<std::size_t>(options.size) *
+         static_cast<std::size_t>(appearance_bands(options));
+}
+
+Normalizer::Normalizer(const NormalizationOptions& options) : options_(options) {
+  if (options.size < 8 || options.size > 256)
+    throw std::invalid_argument("the side of an appearance is " + std::to_string(options.size) +
+                                " pixels, allowed are 8 to 256");
+}
+
+void Normalizer::prepare(Axis& axis, int extent, int square) const {
+  if (axis.extent == extent && axis.square == square) return;
+  axis.extent = extent;
+  axis.square = square;
+  const int n = options_.size;
+  const double scale = static_cast<double>(square) / n;  // source pixels an output pixel
+  const double width = std::max(1.0, scale);             // never narrower than a source pixel
+  const double origin = 0.5 * (extent - square);         // left edge of the square, from the cut's edge
+  axis.taps.resize(static_cast<std::size_t>(n));
+  axis.weights.clear();
+  for (int i = 0; i < n; ++i) {
+    const double middle = origin + (i + 0.5) * scale;
+    const double low = middle - 0.5 * width;
+    const double high = middle + 0.5 * width;
+    const int first = std::max(0, static_cast<int>(std::floor(low)));
+    const int last = std::min(extent, static_cast<int>(std::ceil(high)));
+    Tap tap{first, std::max(0, last - first), axis.weights.size()};
+    for (int s = first; s < last; ++s) {
+      const double covered = std::min<double>(high, s + 1) - std::max<double>(low, s);
+      axis.weights.push_back(static_cast<float>(std::max(0.0, covered) / width));
+    }
+    axis.taps[static_cast<std::size_t>(i)] = tap;
+  }
+}
+
+const float* Normalizer::row(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, int y) {
+  const auto width = static_cast<std::size_t>(cut.cols);
+  if (cut.type() == CV_16UC1) {
+    const auto* pixels = cut.ptr<std::uint16_t>(y);
+    const float base = 256.0F * level[0];
+    for (std::size_t x = 0; x < width; ++x)
+      converted_[x] = std::max(0.0F, static_cast<float>(pixels[x]) - base) / 256.0F;
+    return converted_.data();
+  }
+  const auto* pixels = cut.ptr<std::uint8_t>(y);
+  const int bands = cut.channels();
+  subtract_level(pixels, width * static_cast<std::size_t>(bands), level.data(), bands, converted_.data());
+  if (bands == 3 && !options_.color)
+    for (std::size_t x = 0; x < width; ++x)
+      converted_[x] = luma(converted_[3 * x], converted_[3 * x + 1], converted_[3 * x + 2]);
+  return converted_.data();
+}
+
+float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level,
+                            std::span<float> appearance) {
+  if (cut.empty() || (cut.type() != CV_8UC1 && cut.type() != CV_8UC3 && cut.type() != CV_16UC1))
+    throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
+                                cv::typeToString(cut.type()));
+  if (options_.color && cut.channels() != 3)
+    throw std::invalid_argument("the model was learned in colour, the picture is grey; learn with --grey");
+  if (appearance.size() != length())
+    throw std::invalid_argument("an appearance has " + std::to_string(length()) + " numbers, room is for " +
+                                std::to_string(appearance.size()));
+  const auto n = static_cast<std::size_t>(options_.size);
+  const auto bands = static_cast<std::size_t>(appearance_bands(options_));
+  const auto width = static_cast<std::size_t>(cut.cols) * bands;
+  const int square = std::max(cut.rows, cut.cols);
+  prepare(vertical_, cut.rows, square);
+  prepare(horizontal_, cut.cols, square);
+  converted_.resize(std::max(converted_.size(), static_cast<std::size_t>(cut.cols) * 3));
+  sums_.assign(n * width, 0.0F);
+
+  // Vertically: each source row goes into the output rows it overlaps, first and last of which only move
+  // down.
+  std::size_t first_row = 0;
+  for (int y = 0; y < cut.rows; ++y) {
+    const float* source = row(cut, level, y);
+    while (first_row < n && vertical_.taps[first_row].first + vertical_.taps[first_row].count <= y)
+      ++first_row;
+    for (std::size_t i = first_row; i < n && vertical_.taps[i].first <= y; ++i) {
+      const Tap& tap = vertical_.taps[i];
+      const float weight = vertical_.weights[tap.weight + static_cast<std::size_t>(y - tap.first)];
+      add_weighted(source, weight, width, sums_.data() + i * width);
+    }
+  }
+
+  // Horizontally: short weighted sums, band by band.
+  double energy = 0.0;
+  float* out = appearance.data();
+  for (std::size_t i = 0; i < n; ++i) {
+    const float* source = sums_.data() + i * width;
+    for (std::size_t j = 0; j < n; ++j) {
+      const Tap& tap = horizontal_.taps[j];
+      const float* weights = horizontal_.weights.data() + tap.weight;
+      const float* pixels = source + static_cast<std::size_t>(tap.first) * bands;
+      for (std::size_t b = 0; b < bands; ++b) {
+        float sum = 0.0F;
+        for (int s = 0; s < tap.count; ++s)
+          sum += weights[s] * pixels[static_cast<std::size_t>(s) * bands + b];
+        *out++ = sum;
+        energy += static_cast<double>(sum) * sum;
+      }
+    }
+  }
+  return static_cast<float>(std::sqrt(energy));
+}
+
+void quantize(std::span<const float> appearance, std::span<std::uint8_t> bytes) {
+  const float largest = *std::max_element(appearance.begin(), appearance.end());
+  const float gain = largest > 0.0F ? 255.0F / largest : 0.0F;
+  for (std::size_t i = 0; i < appearance.size(); ++i)
+    bytes[i] = static_cast<std::uint8_t>(std::lround(appearance[i] * gain));
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,86 @@
+#pragma once
+
+/// The few HDF5 calls a model file needs, each handle with one owner. Everything here throws Hdf5Failure.
+///
+/// The HDF5 library is not thread-safe: hold an Hdf5Lock while any of these objects live.
+
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <hdf5.h>
+
+namespace eigenpose {
+
+class Hdf5Failure : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Exclusive use of the library, with its own error printing off.
+class Hdf5Lock {
+ public:
+  Hdf5Lock();
+
+ private:
+  std::scoped_lock<std::mutex> lock_;
+};
+
+/// One HDF5 handle and how to close it.
+class Hdf5Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  /// @throws Hdf5Failure saying `what` when `id` is negative.
+  Hdf5Handle(hid_t id, Close close, const std::string& what);
+  Hdf5Handle(Hdf5Handle&& other) noexcept;
+  Hdf5Handle& operator=(Hdf5Handle&&) = delete;
+  ~Hdf5Handle();
+  [[nodiscard]] hid_t get() const { return id_; }
+
+ private:
+  hid_t id_;
+  Close close_;
+};
+
+/// A group: attributes, datasets and groups below it.
+class Hdf5Group {
+ public:
+  explicit Hdf5Group(Hdf5Handle handle) : handle_(std::move(handle)) {}
+
+  [[nodiscard]] Hdf5Group make_group(const std::string& name) const;
+  [[nodiscard]] Hdf5Group open_group(const std::string& name) const;
+  /// Names of the groups below, in alphabetical order.
+  [[nodiscard]] std::vector<std::string> group_names() const;
+
+  void write(const std::string& attribute, double value) const;
+  void write(const std::string& attribute, std::int64_t value) const;
+  void write(const std::string& attribute, const std::string& value) const;
+  [[nodiscard]] double read_double(const std::string& attribute) const;
+  [[nodiscard]] std::int64_t read_integer(const std::string& attribute) const;
+  [[nodiscard]] bool read_bool(const std::string& attribute) const { return read_integer(attribute) != 0; }
+  [[nodiscard]] std::string read_text(const std::string& attribute) const;
+
+  /// Datasets. A matrix is stored column after column, as rows of a file dataset: its shape there is cols ×
+  /// rows.
+  void write(const std::string& dataset, const Eigen::MatrixXf& matrix) const;
+  void write(const std::string& dataset, const Eigen::MatrixXd& matrix) const;
+  [[nodiscard]] Eigen::MatrixXf read_floats(const std::string& dataset) const;
+  [[nodiscard]] Eigen::MatrixXd read_doubles(const std::string& dataset) const;
+
+ private:
+  Hdf5Handle handle_;
+};
+
+/// Makes a file whose first `user_block` bytes are left to the caller, and returns its root. The file is
+/// written when `file` is destroyed, after the root.
+Hdf5Handle create_hdf5(const std::filesystem::path& path, std::uint64_t user_block);
+/// Opens a whole file held in memory. `bytes` must outlive the handle.
+Hdf5Handle open_hdf5(std::span<unsigned char> bytes);
+Hdf5Group root_of(const Hdf5Handle& file);
+
+}  // namespace eigenpose

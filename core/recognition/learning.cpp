@@ -1,0 +1,122 @@
+#include "core/recognition/learning.h"
+
+#include <chrono>
+#include <ctime>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/base/parallel.h"
+
+namespace eigenpose {
+namespace {
+
+std::string utc_now() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+/// Measures one stage after the other.
+class Stopwatch {
+ public:
+  Duration lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const Duration since = now - last_;
+    last_ = now;
+    return since;
+  }
+
+ private:
+  TimePoint last_ = std::chrono::steady_clock::now();
+};
+
+void check_names(std::span<const TrainingSet> sets) {
+  std::set<std::string> names;
+  for (const TrainingSet& set : sets)
+    if (!names.insert(set.images->object()).second)
+      throw Error("two image sets are of the object \"" + set.images->object() +
+                  "\"; learn only one of them");
+}
+
+}  // namespace
+
+std::vector<TrainingSet> all_views(std::span<const ImageSet> sets) {
+  std::vector<TrainingSet> result;
+  for (const ImageSet& set : sets) result.push_back({&set, {}});
+  return result;
+}
+
+Eigen::MatrixXd project_all(const AppearanceSource& source, const Eigenspace& eigenspace, unsigned threads) {
+  constexpr std::size_t tile_views = 32;
+  const std::size_t count = source.count();
+  Eigen::MatrixXd points(eigenspace.components(), static_cast<Eigen::Index>(count));
+  const Eigen::VectorXf offset = eigenspace.basis.transpose() * eigenspace.mean;
+  parallel_for((count + tile_views - 1) / tile_views, threads, [&](std::size_t t) {
+    const std::size_t first = t * tile_views;
+    const std::size_t n = std::min(tile_views, count - first);
+    Eigen::MatrixXf tile(eigenspace.length(), static_cast<Eigen::Index>(n));
+    source.read(first, tile);
+    const Eigen::MatrixXf projected = eigenspace.basis.transpose() * tile;
+    points.middleCols(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(n)) =
+        (projected.colwise() - offset).cast<double>();
+  });
+  return points;
+}
+
+Model learn(std::span<const TrainingSet> sets, LearningOptions options, LearningReport* report,
+            const Progress& progress, std::stop_token stop) {
+  LearningReport local;
+  LearningReport& told = report != nullptr ? *report : local;
+  told = {};
+  Stopwatch watch;
+  const TimePoint began = std::chrono::steady_clock::now();
+  check_names(sets);
+  options.normalization.cropped =
+      !sets.empty() &&
+      std::all_of(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.images->cropped(); });
+  options.solver.threads = options.threads;
+  options.rejection.threads = options.threads;
+
+  const ViewStore views(sets, options.normalization, options.threads, progress, stop);
+  told.views = views.count();
+  told.normalize_time = watch.lap();
+
+  Model model;
+  model.normalization = options.normalization;
+  model.eigenspace = solve_eigenspace(views, options.solver, &told.solver, progress, stop);
+  told.eigenspace_time = watch.lap();
+
+  const Eigen::MatrixXd points = project_all(views, model.eigenspace, options.threads);
+  std::vector<Manifold> manifolds;
+  for (const ObjectViews& object : views.objects())
+    manifolds.push_back(Manifold::interpolate(
+        object.axes,
+        points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count)),
+        options.spline_degree));
+  told.manifold_time = watch.lap();
+
+  told.evidence =
+      measure_rejection(views, model.eigenspace, points, manifolds, options.rejection, progress, stop);
+  told.rejection_time = watch.lap();
+
+  for (std::size_t o = 0; o < manifolds.size(); ++o) {
+    const ObjectViews& object = views.objects()[o];
+    const RejectionEvidence& evidence = told.evidence[o];
+    ModelObject learned{object.object, object.workspace, std::move(manifolds[o])};
+    learned.rejection_distance = evidence.rejection_distance;
+    learned.typical_distance = evidence.typical_distance;
+    learned.dof_observable = evidence.dof_observable;
+    learned.pose_observable = evidence.dof_observable.front();
+    learned.views = object.count;
+    model.objects.push_back(std::move(learned));
+  }
+  model.provenance = {options.program_version, utc_now(), options.image_sets, told.solver.solver,
+                      told.solver.energy};
+  told.total_time = std::chrono::steady_clock::now() - began;
+  return model;
+}
+
+}  // namespace eigenpose

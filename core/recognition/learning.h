@@ -1,0 +1,52 @@
+#pragma once
+
+/// From image sets to a model (sections 3 and 4 of the paper).
+
+#include <span>
+#include <stop_token>
+#include <string>
+
+#include "core/base/progress.h"
+#include "core/model/model.h"
+#include "core/recognition/rejection.h"
+#include "core/recognition/view_store.h"
+#include "core/subspace/solver.h"
+
+namespace eigenpose {
+
+struct LearningOptions {
+  NormalizationOptions normalization;
+  SolverOptions solver;
+  int spline_degree = 2;  ///< 1, 2 or 3
+  RejectionOptions rejection;
+  unsigned threads = 0;  ///< 0: all cores. The model does not depend on it.
+  /// Kept in the model's provenance.
+  std::string image_sets;
+  std::string program_version;
+};
+
+struct LearningReport {
+  std::size_t views = 0;
+  SolverReport solver;
+  std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
+  Duration normalize_time{};
+  Duration eigenspace_time{};
+  Duration manifold_time{};
+  Duration rejection_time{};
+  Duration total_time{};
+};
+
+/// Learns a model of all objects of `sets`. `options.normalization.cropped` is decided here: true when every
+/// set is cropped.
+/// @throws FileError, Error (too few views, no grid of poses, two sets of one object, nothing to be seen),
+/// std::invalid_argument for options out of range, Interrupted.
+Model learn(std::span<const TrainingSet> sets, LearningOptions options, LearningReport* report = nullptr,
+            const Progress& progress = {}, std::stop_token stop = {});
+
+/// All views of every set.
+std::vector<TrainingSet> all_views(std::span<const ImageSet> sets);
+
+/// K × M: every appearance of `source` projected. On all cores.
+Eigen::MatrixXd project_all(const AppearanceSource& source, const Eigenspace& eigenspace, unsigned threads);
+
+}  // namespace eigenpose

@@ -1,0 +1,267 @@
+#include "core/recognition/recognizer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "core/image/normalization.h"
+#include "core/image/segmentation.h"
+#include "core/manifold/search.h"
+#include "core/recognition/pose_table.h"
+
+namespace eigenpose {
+namespace {
+
+using SteadyTime = std::chrono::steady_clock;
+
+/// How far beyond the largest rejection distance the search looks for the runner-up.
+constexpr double search_reach = 1.5;
+/// Numbers of a point that vary independently when a view is moved: the typical distance spreads over about
+/// so many. Measured on moved views of learned objects; it turns distances into likelihoods.
+constexpr double effective_dimensions = 6.0;
+/// Below this probability of the best against the second best, the outcome is ambiguous.
+constexpr double sure_enough = 0.7;
+/// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
+constexpr double poses_apart = 1.0 / 12.0;
+/// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.
+constexpr double least_side_share = 0.25;
+
+/// Adds the time since it was made to a duration.
+class Lap {
+ public:
+  explicit Lap(Duration& into) : into_(into), began_(SteadyTime::now()) {}
+  Lap(const Lap&) = delete;
+  Lap& operator=(const Lap&) = delete;
+  ~Lap() { into_ += SteadyTime::now() - began_; }
+
+ private:
+  Duration& into_;
+  TimePoint began_;
+};
+
+std::vector<Manifold> manifolds_of(const Model& model) {
+  std::vector<Manifold> manifolds;
+  for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
+  return manifolds;
+}
+
+}  // namespace
+
+/// The stages of recognition, each a function; what they pass on stands in the fields between them.
+struct Recognizer::Impl {
+  explicit Impl(std::shared_ptr<const Model> learned);
+
+  std::shared_ptr<const Model> model;
+  Segmenter segmenter;
+  Normalizer normalizer;
+  std::vector<Manifold> manifolds;
+  std::unique_ptr<ManifoldSearch> search;
+  std::vector<PoseTable> poses;  ///< one an object
+  Eigen::VectorXf mean_point;    ///< basisᵀ mean
+  double search_bound = 0.0;
+
+  // Scratch, reused from frame to frame.
+  Eigen::VectorXf appearance;
+  Eigen::VectorXf point;
+  std::array<ClosestPoint, 2> closest;
+  std::size_t closest_count = 0;
+  std::array<double, max_manifold_dofs> other_q{};
+  Region whole;
+  std::vector<Outcome> outcomes;
+  std::size_t outcome_count = 0;
+  std::vector<Hypothesis> spare;  ///< hypotheses taken out of outcomes, with their memory
+
+  std::span<const Region> find_regions(const cv::Mat& image);
+  [[nodiscard]] bool too_small(const Region& region) const;
+  /// Fills `appearance`; returns its energy.
+  float normalize(const cv::Mat& image, std::size_t region);
+  void project(float energy);
+  void find_closest();
+  void judge(Outcome& outcome);
+  void estimate_pose(Outcome& outcome, const ClosestPoint& best);
+
+  Outcome& next_outcome();
+  Hypothesis take_spare();
+  void give_back(std::optional<Hypothesis>& hypothesis);
+  void describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found);
+};
+
+Recognizer::Impl::Impl(std::shared_ptr<const Model> learned)
+    : model(std::move(learned)),
+      segmenter(model->normalization.segmentation),
+      normalizer(model->normalization),
+      manifolds(manifolds_of(*model)),
+      search(make_search("tree", manifolds)),
+      mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
+      appearance(model->eigenspace.length()),
+      point(model->eigenspace.components()) {
+  poses.reserve(manifolds.size());
+  for (const Manifold& manifold : manifolds) poses.emplace_back(manifold);
+  for (const ModelObject& object : model->objects)
+    search_bound = std::max(search_bound, search_reach * object.rejection_distance);
+}
+
+std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
+  if (!model->normalization.cropped) return segmenter.segment(image);
+  whole = {cv::Rect(0, 0, image.cols, image.rows), image.rows * image.cols, false};
+  return {&whole, 1};
+}
+
+bool Recognizer::Impl::too_small(const Region& region) const {
+  return std::max(region.box.width, region.box.height) < least_side_share * model->normalization.size;
+}
+
+float Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
+  const std::span<float> out(appearance.data(), static_cast<std::size_t>(appearance.size()));
+  if (model->normalization.cropped) return normalizer.normalize(image, {0, 0, 0}, out);
+  return normalizer.normalize(segmenter.cut_out(image, region), segmenter.background().level, out);
+}
+
+void Recognizer::Impl::project(float energy) {
+  // Norm and mean are folded in: basisᵀ (x/‖x‖ − mean).
+  point.noalias() = model->eigenspace.basis.transpose() * appearance;
+  point /= energy;
+  point -= mean_point;
+}
+
+void Recognizer::Impl::find_closest() {
+  closest_count = search->nearest_into(point, closest, search_bound);
+  // Nothing within reach: the nearest is still worth telling.
+  if (closest_count == 0) closest_count = search->nearest_into(point, std::span(closest).first(1));
+}
+
+void Recognizer::Impl::judge(Outcome& outcome) {
+  const ClosestPoint& best = closest[0];
+  const ModelObject& object = model->objects[best.manifold];
+  describe(outcome.best, best);
+  outcome.rejection_distance = object.rejection_distance;
+  if (closest_count > 1) describe(outcome.runner_up, closest[1]);
+  if (best.distance > object.rejection_distance) {
+    outcome.verdict = Verdict::unknown;
+    return;
+  }
+  outcome.verdict = Verdict::recognized;
+  const double variance =
+      std::max(1e-12, object.typical_distance * object.typical_distance / effective_dimensions);
+  const auto likelihood = [&](double distance) {
+    return std::exp(-(distance * distance - best.distance * best.distance) / (2.0 * variance));
+  };
+  const double second = closest_count > 1 ? likelihood(closest[1].distance) : 0.0;
+  if (1.0 < sure_enough * (1.0 + second)) outcome.verdict = Verdict::ambiguous;
+  outcome.confidence = 1.0 / (1.0 + second + likelihood(object.rejection_distance));
+  estimate_pose(outcome, best);
+  const std::span<double> q(other_q.data(), object.workspace.size());
+  const auto other = poses[best.manifold].other_minimum(point, outcome.best->q, poses_apart, q);
+  if (other && 1.0 < sure_enough * (1.0 + likelihood(std::max(best.distance, other->distance)))) {
+    outcome.other_pose = take_spare();
+    outcome.other_pose->object = object.name;
+    outcome.other_pose->q.assign(q.begin(), q.end());
+    outcome.other_pose->distance = other->distance;
+  }
+}
+
+void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
+  const ModelObject& object = model->objects[best.manifold];
+  const double sigma = std::max(best.distance, object.typical_distance) / std::sqrt(effective_dimensions);
+  const auto sensitivity = poses[best.manifold].sensitivity(outcome.best->q);
+  for (std::size_t d = 0; d < sensitivity.size(); ++d)
+    outcome.q_sigma.push_back(object.dof_observable[d] ? sigma * sensitivity[d]
+                                                       : std::numeric_limits<double>::infinity());
+}
+
+Outcome& Recognizer::Impl::next_outcome() {
+  if (outcome_count == outcomes.size()) outcomes.emplace_back();
+  Outcome& outcome = outcomes[outcome_count++];
+  outcome.verdict = Verdict::unknown;
+  give_back(outcome.best);
+  give_back(outcome.runner_up);
+  give_back(outcome.other_pose);
+  outcome.q_sigma.clear();
+  outcome.rejection_distance = 0.0;
+  outcome.confidence = 0.0;
+  return outcome;
+}
+
+Hypothesis Recognizer::Impl::take_spare() {
+  if (spare.empty()) return {};
+  Hypothesis taken = std::move(spare.back());
+  spare.pop_back();
+  return taken;
+}
+
+void Recognizer::Impl::give_back(std::optional<Hypothesis>& hypothesis) {
+  if (!hypothesis) return;
+  spare.push_back(std::move(*hypothesis));
+  hypothesis.reset();
+}
+
+void Recognizer::Impl::describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found) {
+  const ModelObject& object = model->objects[found.manifold];
+  hypothesis = take_spare();
+  hypothesis->object = object.name;
+  hypothesis->q.assign(found.q.begin(),
+                       found.q.begin() + static_cast<std::ptrdiff_t>(object.workspace.size()));
+  hypothesis->distance = found.distance;
+}
+
+Recognizer::Recognizer(std::shared_ptr<const Model> model) {
+  if (model == nullptr || model->objects.empty())
+    throw std::invalid_argument("a recogniser needs a model with at least one object");
+  impl_ = std::make_unique<Impl>(std::move(model));
+}
+
+Recognizer::~Recognizer() = default;
+Recognizer::Recognizer(Recognizer&&) noexcept = default;
+Recognizer& Recognizer::operator=(Recognizer&&) noexcept = default;
+
+const Model& Recognizer::model() const {
+  return *impl_->model;
+}
+
+std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, RecognitionTimes* times) {
+  RecognitionTimes local;
+  RecognitionTimes& spent = times != nullptr ? *times : local;
+  spent = {};
+  const Lap total(spent.total);
+  Impl& impl = *impl_;
+  if (image.empty() || (image.depth() != CV_8U && image.type() != CV_16UC1))
+    throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
+                                cv::typeToString(image.type()));
+  if (impl.model->normalization.color && image.channels() != 3)
+    throw std::invalid_argument("the model was learned in colour, the picture is grey; learn with --grey");
+  std::span<const Region> regions;
+  {
+    const Lap lap(spent.segment);
+    regions = impl.find_regions(image);
+  }
+  impl.outcome_count = 0;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    const Region& region = regions[i];
+    Outcome& outcome = impl.next_outcome();
+    outcome.box = region.box;
+    if (region.touches_border || impl.too_small(region)) {
+      outcome.verdict = region.touches_border ? Verdict::touches_border : Verdict::too_small;
+      continue;
+    }
+    float energy = 0.0F;
+    {
+      const Lap lap(spent.normalize);
+      energy = impl.normalize(image, i);
+    }
+    if (!(energy > 0.0F)) continue;  // black: nothing is known of it
+    {
+      const Lap lap(spent.project);
+      impl.project(energy);
+    }
+    {
+      const Lap lap(spent.search);
+      impl.find_closest();
+      impl.judge(outcome);
+    }
+  }
+  return {impl.outcomes.data(), impl.outcome_count};
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,169 @@
+#include "core/recognition/rejection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <numeric>
+#include <random>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/base/error.h"
+#include "core/base/parallel.h"
+#include "core/manifold/search.h"
+
+namespace eigenpose {
+namespace {
+
+/// A DOF is seen when left-out views come back this near to their value, as a share of its range. Blind
+/// guessing gives a quarter of the range in the median; half a turn wrong every second time gives about as
+/// much.
+constexpr double observable_error_share = 0.12;
+
+double quantile(std::vector<double> values, double share) {
+  const auto at = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size() - 1)));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+double root_mean_square(const std::vector<double>& values) {
+  const double squares = std::inner_product(values.begin(), values.end(), values.begin(), 0.0);
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+/// A view as a picture of bytes; shares memory.
+cv::Mat as_picture(std::span<const std::uint8_t> bytes, const NormalizationOptions& options) {
+  return {options.size, options.size, CV_8UC(appearance_bands(options)),
+          const_cast<std::uint8_t*>(bytes.data())};
+}
+
+/// The view as an imperfect cut-out would show it.
+cv::Mat moved(const cv::Mat& view, const RejectionOptions& options, std::mt19937& random) {
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const double side = view.cols;
+  const double turn = options.turn_deg * unit(random);
+  const double scale = 1.0 + options.scale * unit(random);
+  const auto middle = static_cast<float>(0.5 * (side - 1));
+  cv::Mat warp = cv::getRotationMatrix2D({middle, middle}, turn, scale);
+  warp.at<double>(0, 2) += options.shift * side * unit(random);
+  warp.at<double>(1, 2) += options.shift * side * unit(random);
+  cv::Mat result;
+  cv::warpAffine(view, result, warp, view.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return result;
+}
+
+/// Distances of moved views of one object to its manifold.
+std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& object,
+                                    const Eigenspace& eigenspace, const ManifoldSearch& search,
+                                    const RejectionOptions& options, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  const Eigen::Index length = eigenspace.length();
+  const Eigen::VectorXf offset = eigenspace.basis.transpose() * eigenspace.mean;
+  Eigen::MatrixXf tile(length, static_cast<Eigen::Index>(options.moved_views));
+  std::vector<double> distances;
+  for (std::size_t i = object.first; i < object.first + object.count; ++i) {
+    const cv::Mat view = as_picture(views.bytes(i), views.normalization());
+    for (Eigen::Index c = 0; c < tile.cols(); ++c) {
+      const cv::Mat picture = moved(view, options, random);
+      const Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>> bytes(picture.data, length);
+      tile.col(c) = bytes.cast<float>();
+      tile.col(c).normalize();
+    }
+    const Eigen::MatrixXf projected = (eigenspace.basis.transpose() * tile).colwise() - offset;
+    for (Eigen::Index c = 0; c < projected.cols(); ++c)
+      distances.push_back(search.nearest(projected.col(c), 1).front().distance);
+  }
+  return distances;
+}
+
+/// The grid without every second value of axis `d`, beginning with value `first`: points to fit, and those
+/// left out.
+struct Fold {
+  std::vector<SampleAxis> axes;
+  std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> left_out;
+};
+
+Fold make_fold(const ObjectViews& object, std::size_t d, std::size_t first) {
+  Fold fold;
+  fold.axes = object.axes;
+  const auto& all = object.axes[d].samples;
+  const bool open = !object.axes[d].dof.periodic;
+  const auto leaves = [&](std::size_t i) {
+    const bool end = i == 0 || i + 1 == all.size();
+    return i % 2 == first && !(open && end);  // beyond the end of an open axis there is no manifold
+  };
+  auto& samples = fold.axes[d].samples;
+  samples.clear();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (!leaves(i)) samples.push_back(all[i]);
+  std::size_t inner = 1;
+  for (std::size_t a = d + 1; a < object.axes.size(); ++a) inner *= object.axes[a].samples.size();
+  for (std::size_t cell = 0; cell < object.count; ++cell) {
+    const std::size_t i = (cell / inner) % all.size();
+    (leaves(i) ? fold.left_out : fold.kept).push_back(static_cast<Eigen::Index>(object.first + cell));
+  }
+  return fold;
+}
+
+/// |error| in DOF d of views that were left out along it. Empty when there are too few values.
+std::vector<double> left_out_errors(const ObjectViews& object, std::size_t d, const Eigen::MatrixXd& points,
+                                    int degree) {
+  const auto& axis = object.axes[d];
+  std::vector<double> errors;
+  if (axis.samples.size() < (axis.dof.periodic ? 6U : 5U)) return errors;
+  std::size_t inner = 1;
+  for (std::size_t a = d + 1; a < object.axes.size(); ++a) inner *= object.axes[a].samples.size();
+  for (std::size_t first = 0; first < 2; ++first) {
+    const Fold fold = make_fold(object, d, first);
+    const std::vector<Manifold> manifold{
+        Manifold::interpolate(fold.axes, points(Eigen::all, fold.kept), degree)};
+    const auto search = make_search("tree", manifold);
+    for (const Eigen::Index i : fold.left_out) {
+      const double found = search->nearest(points.col(i).cast<float>(), 1).front().q[d];
+      const std::size_t sample = ((static_cast<std::size_t>(i) - object.first) / inner) % axis.samples.size();
+      errors.push_back(std::abs(axis.dof.difference(found, axis.samples[sample])));
+    }
+  }
+  return errors;
+}
+
+}  // namespace
+
+std::vector<RejectionEvidence> measure_rejection(const ViewStore& views, const Eigenspace& eigenspace,
+                                                 const Eigen::MatrixXd& points,
+                                                 std::span<const Manifold> manifolds,
+                                                 const RejectionOptions& options, const Progress& progress,
+                                                 std::stop_token stop) {
+  if (options.moved_views < 1 || !(options.accepted_share > 0.0 && options.accepted_share <= 1.0))
+    throw std::invalid_argument("rejection needs at least one moved view and a share of 0 to 1, got " +
+                                std::to_string(options.moved_views) + " and " +
+                                std::to_string(options.accepted_share));
+  std::vector<RejectionEvidence> evidence(manifolds.size());
+  std::mutex progress_mutex;
+  std::size_t done = 0;  // guarded by progress_mutex
+  parallel_for(manifolds.size(), options.threads, [&](std::size_t o) {
+    if (stop.stop_requested()) throw Interrupted();
+    const ObjectViews& object = views.objects()[o];
+    RejectionEvidence& found = evidence[o];
+    const auto search = make_search("tree", manifolds.subspan(o, 1));
+    const auto distances =
+        moved_distances(views, object, eigenspace, *search, options, static_cast<std::uint32_t>(o + 1));
+    found.typical_distance = root_mean_square(distances);
+    found.rejection_distance = options.slack * quantile(distances, options.accepted_share);
+    for (std::size_t d = 0; d < object.axes.size(); ++d) {
+      const auto errors = left_out_errors(object, d, points, manifolds[o].degree());
+      found.left_out_error.push_back(errors.empty() ? std::numeric_limits<double>::quiet_NaN()
+                                                    : quantile(errors, 0.5));
+      found.dof_observable.push_back(errors.empty() ||
+                                     found.left_out_error.back() <=
+                                         observable_error_share * object.axes[d].dof.period());
+    }
+    const std::lock_guard lock(progress_mutex);
+    if (progress) progress({"measuring rejection", ++done, manifolds.size()});
+  });
+  return evidence;
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,170 @@
+/// `eigenpose evaluate`: how well objects are told apart, measured on views that were not learned.
+
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/recognition/evaluation.h"
+#include "daemon/cli/commands.h"
+#include "daemon/cli/console.h"
+#include "daemon/cli/learning_options.h"
+
+namespace eigenpose::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* examples = R"(
+Learns every k-th view of each object and recognises all others. Nothing of a test view influences learning or
+thresholds. A view counts as recognised when the nearest object is the right one; how many of those would have been
+reported as unknown or ambiguous is told beside it. Pose errors are over recognised views.
+
+Examples:
+  eigenpose evaluate sets/coil-20 --learn-every 2 --components 20 --size 128
+  eigenpose evaluate sets/coil-100 --learn-every 4 --color --json > result.json
+  eigenpose evaluate sets/coil-20 --objects obj1,obj5)";
+
+struct Options {
+  std::string sets;
+  std::size_t learn_every = 2;
+  std::size_t offset = 0;
+  LearningArguments learning;
+  bool as_json = false;
+};
+
+double milliseconds(Duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+double micro_per_view(Duration duration, std::size_t views) {
+  return 1e3 * milliseconds(duration) / static_cast<double>(views);
+}
+
+json to_json(const EvaluationReport& report) {
+  const auto pose = report.pose_errors();
+  json objects = json::array();
+  for (const ObjectEvaluation& object : report.objects) {
+    const auto errors = summarize_errors(object.pose_errors);
+    objects.push_back({{"object", object.object},
+                       {"learned_views", object.learned_views},
+                       {"test_views", object.test_views},
+                       {"right", object.right},
+                       {"rejected", object.rejected},
+                       {"ambiguous", object.ambiguous},
+                       {"nothing_found", object.missed},
+                       {"pose_observable", object.pose_observable},
+                       {"pose_error_mean_deg", errors.mean},
+                       {"pose_error_median_deg", errors.median},
+                       {"pose_error_p90_deg", errors.p90},
+                       {"pose_gross_rate", errors.gross_rate}});
+  }
+  json confusions = json::array();
+  for (const auto& [pair, views] : report.confusions)
+    confusions.push_back({{"object", pair.first}, {"said", pair.second}, {"views", views}});
+  const std::size_t n = report.test_views;
+  return {{"recognition_rate", report.recognition_rate()},
+          {"pose_error_mean_deg", pose.mean},
+          {"pose_error_median_deg", pose.median},
+          {"pose_error_p90_deg", pose.p90},
+          {"pose_gross_rate", pose.gross_rate},
+          {"rejected_rate", static_cast<double>(report.rejected) / static_cast<double>(n)},
+          {"ambiguous_rate", static_cast<double>(report.ambiguous) / static_cast<double>(n)},
+          {"test_views", n},
+          {"learned_views", report.learning.views},
+          {"solver", report.learning.solver.solver},
+          {"components", report.learning.solver.components},
+          {"energy_kept", report.learning.solver.energy},
+          {"objects", objects},
+          {"confusions", confusions},
+          {"times_ms",
+           {{"normalize", milliseconds(report.learning.normalize_time)},
+            {"eigenspace", milliseconds(report.learning.eigenspace_time)},
+            {"manifolds", milliseconds(report.learning.manifold_time)},
+            {"rejection", milliseconds(report.learning.rejection_time)},
+            {"learning", milliseconds(report.learning.total_time)}}},
+          {"times_us_per_view",
+           {{"load", micro_per_view(report.load_time, n)},
+            {"segment", micro_per_view(report.times.segment, n)},
+            {"normalize", micro_per_view(report.times.normalize, n)},
+            {"project", micro_per_view(report.times.project, n)},
+            {"search", micro_per_view(report.times.search, n)},
+            {"recognition", micro_per_view(report.times.total, n)}}}};
+}
+
+void print(const EvaluationReport& report) {
+  std::printf("%-16s %8s %6s %7s %9s %10s %10s %8s\n", "object", "learned", "tests", "right", "unknown*",
+              "ambiguous*", "pose mean", "median");
+  for (const ObjectEvaluation& object : report.objects) {
+    const auto errors = summarize_errors(object.pose_errors);
+    std::printf("%-16s %8zu %6zu %7zu %9zu %10zu %9.2f° %7.2f°%s\n", object.object.c_str(),
+                object.learned_views, object.test_views, object.right, object.rejected, object.ambiguous,
+                errors.mean, errors.median, object.pose_observable ? "" : "  pose cannot be seen");
+  }
+  std::printf("* of the right ones: would be reported as unknown or ambiguous\n\n");
+  for (const auto& [pair, views] : report.confusions)
+    std::printf("confused: %s taken for %s in %zu view(s)\n", pair.first.c_str(), pair.second.c_str(), views);
+  const auto pose = report.pose_errors();
+  const auto n = static_cast<double>(report.test_views);
+  std::printf("recognised  %.2f %% of %zu test views (%zu objects, %zu views learned)\n",
+              100.0 * report.recognition_rate(), report.test_views, report.objects.size(),
+              report.learning.views);
+  std::printf("pose error  mean %.2f°, median %.2f°, 90 %% below %.2f°, above 45°: %.2f %%\n", pose.mean,
+              pose.median, pose.p90, 100.0 * pose.gross_rate);
+  std::printf("rejected    %.2f %% unknown, %.2f %% ambiguous\n",
+              100.0 * static_cast<double>(report.rejected) / n,
+              100.0 * static_cast<double>(report.ambiguous) / n);
+  std::printf("eigenspace  %zu dimensions by %s, %.1f %% of the scatter\n", report.learning.solver.components,
+              report.learning.solver.solver.c_str(), 100.0 * report.learning.solver.energy);
+  std::printf("learning    %.0f ms: normalise %.0f, eigenspace %.0f, manifolds %.0f, rejection %.0f\n",
+              milliseconds(report.learning.total_time), milliseconds(report.learning.normalize_time),
+              milliseconds(report.learning.eigenspace_time), milliseconds(report.learning.manifold_time),
+              milliseconds(report.learning.rejection_time));
+  const std::size_t views = report.test_views;
+  std::printf(
+      "a view      %.0f µs: segment %.0f, normalise %.0f, project %.0f, search %.0f (reading the file: "
+      "%.0f)\n",
+      micro_per_view(report.times.total, views), micro_per_view(report.times.segment, views),
+      micro_per_view(report.times.normalize, views), micro_per_view(report.times.project, views),
+      micro_per_view(report.times.search, views), micro_per_view(report.load_time, views));
+}
+
+int run(const Options& options, const std::stop_token& stop) {
+  const auto sets = open_chosen_sets(options.sets, options.learning);
+  EvaluationOptions evaluation;
+  evaluation.learn_every = options.learn_every;
+  evaluation.offset = options.offset;
+  evaluation.learning = learning_options(options.learning, sets, options.sets);
+  evaluation.threads = options.learning.threads;
+  ConsoleProgress progress;
+  const EvaluationReport report = evaluate(sets, evaluation, progress.callback(), stop);
+  progress.clear();
+  if (options.as_json)
+    std::printf("%s\n", to_json(report).dump(2).c_str());
+  else
+    print(report);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app, CommandLine& line) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("evaluate", "Measure recognition and pose on views that were not learned");
+  command->footer(examples);
+  command->add_option("sets", options->sets, "Folder of image sets")->required();
+  command->add_option("--learn-every", options->learn_every, "Learn every k-th view, test on the others")
+      ->check(CLI::Range(2, 10000))
+      ->capture_default_str();
+  command->add_option("--offset", options->offset, "The first view that is learned")->capture_default_str();
+  add_learning_options(*command, options->learning);
+  command->add_flag("--json", options->as_json, "Print the result as JSON");
+  command->callback(
+      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+}
+
+}  // namespace eigenpose::cli

@@ -1,0 +1,112 @@
+/// `eigenpose inspect`: what a model file holds.
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/model/model_file.h"
+#include "daemon/cli/commands.h"
+
+namespace eigenpose::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* examples = R"(
+The file is checked as a whole first; a damaged one is refused. It is HDF5: Python, MATLAB and h5dump open it too.
+
+Examples:
+  eigenpose inspect lab.model
+  eigenpose inspect lab.model --json)";
+
+struct Options {
+  std::string model;
+  bool as_json = false;
+};
+
+json to_json(const Model& model) {
+  json objects = json::array();
+  for (const ModelObject& object : model.objects) {
+    json axes = json::array();
+    for (std::size_t d = 0; d < object.workspace.size(); ++d) {
+      const Dof& dof = object.workspace[d];
+      axes.push_back({{"name", dof.name},
+                      {"unit", dof.unit},
+                      {"lower", dof.lower},
+                      {"upper", dof.upper},
+                      {"periodic", dof.periodic},
+                      {"values", object.manifold.axes()[d].samples.size()},
+                      {"observable", static_cast<bool>(object.dof_observable[d])}});
+    }
+    objects.push_back({{"name", object.name},
+                       {"views", object.views},
+                       {"rejection_distance", object.rejection_distance},
+                       {"typical_distance", object.typical_distance},
+                       {"pose_observable", object.pose_observable},
+                       {"spline_degree", object.manifold.degree()},
+                       {"workspace", axes}});
+  }
+  const Eigen::VectorXd& values = model.eigenspace.eigenvalues;
+  return {{"size", model.normalization.size},
+          {"color", model.normalization.color},
+          {"cropped", model.normalization.cropped},
+          {"components", model.eigenspace.components()},
+          {"appearance_length", model.eigenspace.length()},
+          {"eigenvalues", std::vector<double>(values.data(), values.data() + values.size())},
+          {"total_scatter", model.eigenspace.total_scatter},
+          {"provenance",
+           {{"program_version", model.provenance.program_version},
+            {"created", model.provenance.created},
+            {"image_sets", model.provenance.image_sets},
+            {"solver", model.provenance.solver},
+            {"energy", model.provenance.energy}}},
+          {"objects", objects}};
+}
+
+void print(const Model& model) {
+  std::printf("learned   %s by eigenpose %s from %s\n", model.provenance.created.c_str(),
+              model.provenance.program_version.c_str(), model.provenance.image_sets.c_str());
+  std::printf("views     %dx%d %s, %s\n", model.normalization.size, model.normalization.size,
+              model.normalization.color ? "colour" : "grey",
+              model.normalization.cropped ? "each picture taken whole" : "objects cut out of each picture");
+  std::printf("space     %td dimensions by %s keep %.1f %% of the scatter\n", model.eigenspace.components(),
+              model.provenance.solver.c_str(), 100.0 * model.provenance.energy);
+  std::printf("\n%-16s %6s %18s %9s  %s\n", "object", "views", "rejection distance", "typical",
+              "degrees of freedom");
+  for (const ModelObject& object : model.objects) {
+    std::printf("%-16s %6zu %18.4f %9.4f  ", object.name.c_str(), object.views, object.rejection_distance,
+                object.typical_distance);
+    for (std::size_t d = 0; d < object.workspace.size(); ++d) {
+      const Dof& dof = object.workspace[d];
+      std::printf("%s%s: %zu values in %g…%g %s%s%s", d > 0 ? "; " : "", dof.name.c_str(),
+                  object.manifold.axes()[d].samples.size(), dof.lower, dof.upper, dof.unit.c_str(),
+                  dof.periodic ? ", closed" : "", object.dof_observable[d] ? "" : ", cannot be seen");
+    }
+    std::printf("\n");
+  }
+}
+
+int run(const Options& options) {
+  const Model model = load_model(options.model);
+  if (options.as_json)
+    std::printf("%s\n", to_json(model).dump(2).c_str());
+  else
+    print(model);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_inspect_command(CLI::App& app, CommandLine& line) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("inspect", "Show what a model file holds");
+  command->footer(examples);
+  command->add_option("model", options->model, "The model file")->required();
+  command->add_flag("--json", options->as_json, "Print it as JSON");
+  command->callback([options, &line] { line.action = [options] { return run(*options); }; });
+}
+
+}  // namespace eigenpose::cli

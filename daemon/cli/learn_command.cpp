@@ -1,0 +1,85 @@
+/// `eigenpose learn`: image sets become a model.
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "core/model/model_file.h"
+#include "core/recognition/learning.h"
+#include "daemon/cli/commands.h"
+#include "daemon/cli/console.h"
+#include "daemon/cli/learning_options.h"
+
+namespace eigenpose::cli {
+namespace {
+
+constexpr const char* examples = R"(
+Examples:
+  eigenpose learn sets/coil-20 --to coil-20.model --size 128
+  eigenpose learn sets/lab --to lab.model --energy 0.95 --components 60
+  eigenpose learn sets/lab --to lab.model --objects mug,duck
+
+The model is written at once when all is learned; a former model of that name stays until then.)";
+
+struct Options {
+  std::string sets;
+  std::string to;
+  LearningArguments learning;
+};
+
+double seconds(Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+void print(const Model& model, const LearningReport& report, const std::string& file) {
+  std::printf("%-16s %6s %18s  %s\n", "object", "views", "rejection distance", "pose");
+  for (std::size_t o = 0; o < model.objects.size(); ++o) {
+    const ModelObject& object = model.objects[o];
+    const double error = report.evidence[o].left_out_error.front();
+    std::printf("%-16s %6zu %18.4f  ", object.name.c_str(), object.views, object.rejection_distance);
+    if (!object.pose_observable)
+      std::printf("cannot be seen: left-out views are %.0f %s off\n", error,
+                  object.workspace[0].unit.c_str());
+    else if (std::isnan(error))
+      std::printf("not checked: too few views\n");
+    else
+      std::printf("left-out views are found within %.1f %s (median)\n", error,
+                  object.workspace[0].unit.c_str());
+  }
+  if (!report.solver.note.empty()) std::printf("note: %s\n", report.solver.note.c_str());
+  std::printf(
+      "learned %zu objects from %zu views in %.1f s: %zu dimensions by %s keep %.1f %% of the scatter\n",
+      model.objects.size(), report.views, seconds(report.total_time), report.solver.components,
+      report.solver.solver.c_str(), 100.0 * report.solver.energy);
+  std::printf("model: %s\n", file.c_str());
+}
+
+int run(const Options& options, const std::stop_token& stop) {
+  const auto sets = open_chosen_sets(options.sets, options.learning);
+  const LearningOptions learning = learning_options(options.learning, sets, options.sets);
+  ConsoleProgress progress;
+  LearningReport report;
+  const Model model = learn(all_views(sets), learning, &report, progress.callback(), stop);
+  save_model(model, options.to);
+  progress.clear();
+  print(model, report, options.to);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_learn_command(CLI::App& app, CommandLine& line) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("learn", "Learn a model from image sets");
+  command->footer(examples);
+  command->add_option("sets", options->sets, "Folder of image sets")->required();
+  command->add_option("--to", options->to, "The model file to write")->required();
+  add_learning_options(*command, options->learning);
+  command->callback(
+      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+}
+
+}  // namespace eigenpose::cli

@@ -1,0 +1,76 @@
+#include "daemon/cli/learning_options.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <CLI/CLI.hpp>
+
+#include "core/base/error.h"
+
+namespace eigenpose::cli {
+
+void add_learning_options(CLI::App& command, LearningArguments& arguments) {
+  command.add_option("--components", arguments.components, "Dimensions of the eigenspace (K)")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  command
+      .add_option("--energy", arguments.energy,
+                  "Keep this share of the scatter (0…1) in at most K dimensions")
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_option("--size", arguments.size, "Side of a normalised view, pixels")
+      ->check(CLI::Range(8, 256))
+      ->capture_default_str();
+  auto* color = command.add_flag("--color", arguments.color,
+                                 "Use colour, all bands jointly (default if the views have it)");
+  command.add_flag("--grey", arguments.grey, "Use brightness only")->excludes(color);
+  command.add_option("--solver", arguments.solver, "auto, gram, krylov, conjugate-gradient, sta or dense")
+      ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "dense"}))
+      ->capture_default_str();
+  command.add_option("--degree", arguments.degree, "Degree of the spline: 1, 2 or 3")
+      ->check(CLI::Range(1, 3))
+      ->capture_default_str();
+  command.add_option("--threads", arguments.threads, "Threads; 0 means all cores")->capture_default_str();
+  command.add_option("--objects", arguments.objects, "Only these objects, e.g. obj1,obj2")->delimiter(',');
+}
+
+std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments) {
+  std::vector<ImageSet> sets = open_image_sets(folder);
+  if (arguments.objects.empty()) return sets;
+  for (const std::string& name : arguments.objects)
+    if (std::none_of(sets.begin(), sets.end(), [&](const ImageSet& set) { return set.object() == name; })) {
+      std::string known;
+      for (const ImageSet& set : sets) known += (known.empty() ? "" : ", ") + set.object();
+      throw ConfigError("--objects: there is no \"" + name + "\" in " + folder + "; there are: " + known);
+    }
+  std::erase_if(sets, [&](const ImageSet& set) {
+    return std::find(arguments.objects.begin(), arguments.objects.end(), set.object()) ==
+           arguments.objects.end();
+  });
+  return sets;
+}
+
+LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
+                                 const std::string& folder) {
+  LearningOptions options;
+  const ImageSet* grey = nullptr;
+  for (const ImageSet& set : sets) {
+    if (!set.complete())
+      throw FileError(set.folder(),
+                      "is not complete; acquire or import it to its end, or leave it out with --objects");
+    if (grey == nullptr && set.load(0).channels() != 3) grey = &set;
+  }
+  if (arguments.color && grey != nullptr)
+    throw ConfigError("--color: the views of \"" + grey->object() + "\" are grey; leave --color out");
+  options.normalization.size = arguments.size;
+  options.normalization.color = !arguments.grey && grey == nullptr;
+  options.solver.solver = arguments.solver;
+  options.solver.components = arguments.components;
+  options.solver.energy = arguments.energy;
+  options.spline_degree = arguments.degree;
+  options.threads = arguments.threads;
+  options.image_sets = std::filesystem::absolute(folder).lexically_normal().string();
+  options.program_version = EIGENPOSE_VERSION;
+  return options;
+}
+
+}  // namespace eigenpose::cli

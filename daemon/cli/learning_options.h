@@ -1,0 +1,44 @@
+#pragma once
+
+/// The options of learning that `learn` and `evaluate` share.
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/image/image_set.h"
+#include "core/recognition/learning.h"
+
+namespace CLI {
+class App;
+}
+
+namespace eigenpose::cli {
+
+struct LearningArguments {
+  std::size_t components = 20;
+  std::optional<double> energy;
+  int size = 64;
+  bool color = false;
+  bool grey = false;
+  std::string solver = "auto";
+  int degree = 2;
+  unsigned threads = 0;
+  std::vector<std::string> objects;
+};
+
+/// Adds --components, --energy, --size, --color, --grey, --solver, --degree, --threads and --objects.
+void add_learning_options(CLI::App& command, LearningArguments& arguments);
+
+/// The image sets below `folder`, only those named by --objects if any.
+/// @throws FileError, ConfigError naming an object that is not there.
+std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments);
+
+/// Colour is taken when all views are in colour, unless --color or --grey says otherwise.
+/// @throws ConfigError when --color meets a grey view.
+LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
+                                 const std::string& folder);
+
+}  // namespace eigenpose::cli
