@@ -15,21 +15,48 @@
 #include "drivers/modbus/modbus_bus.h"
 #include "drivers/modbus/modbus_lamp.h"
 #include "drivers/v4l2/v4l2_camera.h"
+#ifdef EIGENPOSE_SIM
+#include "sim/camera/replay_camera.h"
+#include "sim/camera/sim_camera.h"
+#include "sim/lab/lab_server.h"
+#include "sim/lab/sim_lab.h"
+#include "sim/lab/sim_lamp.h"
+#include "sim/modbus/modbus_server.h"
+#endif
 
 namespace eigenpose {
 namespace {
+
+#ifdef EIGENPOSE_SIM
+/// The simulated lab with its drives and its control, in the order they depend on each other.
+struct SimulatedLab {
+  SimulatedLab(const SimOptions& options, const std::filesystem::path& socket, const Clock& clock)
+      : lab(clock, {.seed = options.seed}),
+        drives(lab, {.speed_factor = options.speed_factor}),
+        control(lab, socket, &drives) {}
+  sim::SimLab lab;
+  sim::SimModbusServer drives;
+  sim::LabServer control;
+};
+#else
+struct SimulatedLab;
+#endif
 
 /// What the constructors below share while a configuration is turned into devices.
 struct Workbench {
   const Config& config;
   const Clock& clock;
+  std::shared_ptr<SimulatedLab> lab;  ///< null without [sim]
+  std::optional<SimulationInfo> simulation;
   std::map<std::string, std::shared_ptr<ModbusBus>> buses;  ///< by endpoint: devices on one line share it
 
   std::shared_ptr<ModbusBus> bus(const std::string& endpoint, const SerialDefaults& serial) {
     std::shared_ptr<ModbusBus>& found = buses[endpoint];
     if (!found) {
       ModbusBusOptions options;
-      options.endpoint = parse_modbus_endpoint(endpoint, serial);
+      const bool simulated = endpoint == "simulated" && simulation;
+      options.endpoint = parse_modbus_endpoint(
+          simulated ? fmt::format("tcp://127.0.0.1:{}", simulation->modbus_port) : endpoint, serial);
       found = std::make_shared<ModbusBus>(std::move(options), clock);
     }
     return found;
@@ -55,6 +82,27 @@ FrameHub::OpenCamera v4l2_camera(const CameraOptions& camera, Workbench& bench) 
     return std::make_unique<V4l2Camera>(options, *system, clock);
   };
 }
+
+#ifdef EIGENPOSE_SIM
+FrameHub::OpenCamera simulated_camera(const CameraOptions& camera, Workbench& bench) {
+  sim::SimCameraOptions options;
+  options.name = camera.name;
+  options.width = camera.width;
+  options.height = camera.height;
+  options.frames_per_second = camera.frames_per_second;
+  options.exposure = std::chrono::microseconds(static_cast<std::int64_t>(camera.exposure_ms * 1000.0));
+  return [options, lab = bench.lab] { return std::make_unique<sim::SimCamera>(lab->lab, options); };
+}
+
+FrameHub::OpenCamera replay_camera(const CameraOptions& camera, Workbench& bench) {
+  sim::ReplayCameraOptions options;
+  options.name = camera.name;
+  options.folder = camera.folder;
+  options.degrees_per_index = camera.degrees_per_index;
+  options.frames_per_second = camera.frames_per_second;
+  return [options, lab = bench.lab] { return std::make_unique<sim::ReplayCamera>(lab->lab, options); };
+}
+#endif
 
 // Axes ---------------------------------------------------------------------------------------------------
 
@@ -90,10 +138,20 @@ std::function<std::unique_ptr<Lamp>()> modbus_lamp(const LampOptions& lamp, Work
   };
 }
 
+#ifdef EIGENPOSE_SIM
+std::function<std::unique_ptr<Lamp>()> simulated_lamp(const LampOptions& lamp, Workbench& bench) {
+  return [name = lamp.name, lab = bench.lab] { return std::make_unique<sim::SimLamp>(lab->lab, name); };
+}
+#endif
+
 // The table ----------------------------------------------------------------------------------------------
 
 const std::map<std::string, FrameHub::OpenCamera (*)(const CameraOptions&, Workbench&)> cameras = {
     {"v4l2", v4l2_camera},
+#ifdef EIGENPOSE_SIM
+    {"simulated", simulated_camera},
+    {"replay", replay_camera},
+#endif
 };
 
 const std::map<std::string, std::function<std::unique_ptr<Axis>()> (*)(const AxisOptions&, Workbench&)> axes =
@@ -104,6 +162,9 @@ const std::map<std::string, std::function<std::unique_ptr<Axis>()> (*)(const Axi
 const std::map<std::string, std::function<std::unique_ptr<Lamp>()> (*)(const LampOptions&, Workbench&)>
     lamps = {
         {"modbus", modbus_lamp},
+#ifdef EIGENPOSE_SIM
+        {"simulated", simulated_lamp},
+#endif
 };
 
 /// The row of a table, and with it the device; what the driver refuses is the configuration's fault.
@@ -121,17 +182,32 @@ auto look_up(const Table& table, const std::string& driver, const std::string& n
   }
 }
 
+void start_lab(Workbench& bench) {
+#ifdef EIGENPOSE_SIM
+  bench.lab = std::make_shared<SimulatedLab>(*bench.config.sim, bench.config.lab_socket(), bench.clock);
+  bench.simulation = SimulationInfo{bench.config.lab_socket(), bench.lab->drives.port()};
+  spdlog::info("event=simulated_lab control={} modbus_port={}", bench.simulation->lab_socket.string(),
+               bench.simulation->modbus_port);
+#else
+  throw ConfigError(bench.config.file.string() +
+                    ": [sim]: this eigenposed was built without the simulated lab");
+#endif
+}
+
 }  // namespace
 
 Devices make_devices(const Config& config, const Clock& clock) {
   Devices devices;
-  Workbench bench{config, clock, {}};
+  Workbench bench{config, clock, nullptr, std::nullopt, {}};
+  if (config.sim) start_lab(bench);
   if (config.camera)
     devices.camera = look_up(cameras, config.camera->driver, config.camera->name, *config.camera, bench);
   for (const AxisOptions& axis : config.axes)
     devices.axes.push_back({axis, look_up(axes, axis.driver, axis.dof.name, axis, bench)});
   for (const LampOptions& lamp : config.lamps)
     devices.lamps.push_back({lamp, look_up(lamps, lamp.driver, lamp.name, lamp, bench)});
+  devices.lab = bench.lab;
+  devices.simulation = bench.simulation;
   return devices;
 }
 

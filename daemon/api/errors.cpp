@@ -15,7 +15,7 @@ Trouble describe(const std::exception_ptr& failure) {
     return {400, std::string("the body is not the JSON this needs: ") + error.what(),
             "see the API's description"};
   } catch (const ConfigError& error) {
-    return {400, error.what(), "change the request or the configuration and try again"};
+    return {400, error.what(), ""};  // the text says what is allowed
   } catch (const DeviceLost& error) {
     return {503, error.what(),
             "check that " + error.device() +
@@ -26,7 +26,7 @@ Trouble describe(const std::exception_ptr& failure) {
   } catch (const DeviceError& error) {
     return {503, error.what(), "see what " + error.device() + " shows, clear it, then try again"};
   } catch (const FileError& error) {
-    return {500, error.what(), "check the file, its folder and the free space of the disk"};
+    return {500, error.what(), ""};  // the text says what to do
   } catch (const Interrupted& error) {
     return {409, error.what(), "start it again when you like: what was done is kept"};
   } catch (const std::invalid_argument& error) {

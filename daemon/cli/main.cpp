@@ -15,12 +15,17 @@
 
 #include "core/base/error.h"
 #include "daemon/cli/commands.h"
+#include "daemon/cli/service_commands.h"
 
 namespace eigenpose::cli {
 namespace {
 
 /// The commands, in the order `--help` shows them.
 const std::vector<AddCommand> commands = {
+    add_acquire_command,    //
+    add_results_command,    //
+    add_status_command,     //
+    add_objects_command,    //
     add_import_command,     //
     add_learn_command,      //
     add_recognize_command,  //
