@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/base/angle.h"
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "daemon/client/api_client.h"
 #include "daemon/cli/console.h"
@@ -68,7 +69,7 @@ void wait_for_daemon(ApiClient& api) {
 }
 
 /// The catalogue in a fresh random order: what is learned, and what stays strange.
-void choose_objects(const std::vector<sim::LabObject>& catalogue, unsigned count, std::mt19937& random,
+void choose_objects(const std::vector<sim::CatalogEntry>& catalogue, unsigned count, std::mt19937& random,
                     std::vector<std::string>& learned, std::vector<std::string>& strangers) {
   for (const auto& object : catalogue) (object.stranger ? strangers : learned).push_back(object.name);
   std::shuffle(learned.begin(), learned.end(), random);
