@@ -24,8 +24,10 @@ const std::map<std::string, std::set<std::string>> licences = {
     {"core/image", {"core/base"}},
     {"core/subspace", {"core/base"}},
     {"core/manifold", {"core/base"}},
-    {"core/model", {"core/base", "core/image", "core/subspace", "core/manifold"}},
-    {"core/recognition", {"core/base", "core/image", "core/subspace", "core/manifold", "core/model"}},
+    {"core/parts", {"core/base", "core/manifold"}},
+    {"core/model", {"core/base", "core/image", "core/subspace", "core/manifold", "core/parts"}},
+    {"core/recognition",
+     {"core/base", "core/image", "core/subspace", "core/manifold", "core/parts", "core/model"}},
     {"drivers", {"core/base", "core/image"}},
     {"drivers/v4l2", {"drivers", "core/base", "core/image"}},
     {"drivers/modbus", {"drivers", "core/base"}},
@@ -34,7 +36,7 @@ const std::map<std::string, std::set<std::string>> licences = {
     {"config", {"drivers", "drivers/v4l2", "drivers/modbus", "drivers/usb", "core/base"}},
     {"daemon",
      {"config", "sim", "drivers", "drivers/v4l2", "drivers/modbus", "drivers/usb", "core/base", "core/image",
-      "core/subspace", "core/manifold", "core/model", "core/recognition"}},
+      "core/subspace", "core/manifold", "core/parts", "core/model", "core/recognition"}},
 };
 
 /// Outside headers that the library must not know: devices, sockets, the daemon's world.

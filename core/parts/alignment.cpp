@@ -1,0 +1,221 @@
+#include "core/parts/alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/LU>
+
+#include "core/parts/dense_kernels.h"
+
+namespace eigenpose {
+namespace {
+
+using Vector5 = Eigen::Matrix<double, 5, 1>;
+
+Vector5 as_vector(const Misalignment& m) {
+  Vector5 v;
+  v << m.gain, m.dx, m.dy, m.scale, m.rotation;
+  return v;
+}
+
+Misalignment as_misalignment(const Vector5& v) {
+  return {v(0), v(1), v(2), v(3), v(4)};
+}
+
+/// Index of the sample that is `steps` away from `t` along axis `a`, or −1 beyond an open end.
+std::ptrdiff_t neighbour(const PoseSpace& space, std::size_t t, std::size_t a, int steps) {
+  const auto& counts = space.sample_counts();
+  std::size_t stride = 1;
+  for (std::size_t i = counts.size(); i-- > a + 1;) {
+    stride *= static_cast<std::size_t>(counts[i]);
+  }
+  const int count = counts[a];
+  const int here = static_cast<int>(t / stride % static_cast<std::size_t>(count));
+  int there = here + steps;
+  if (space.coarse_manifold().axes()[a].dof.periodic) {
+    there = ((there % count) + count) % count;
+  } else if (there < 0 || there >= count) {
+    return -1;
+  }
+  return static_cast<std::ptrdiff_t>(t) +
+         static_cast<std::ptrdiff_t>(there - here) * static_cast<std::ptrdiff_t>(stride);
+}
+
+}  // namespace
+
+Vector5 AlignmentPrior::precision() const {
+  Vector5 sigma;
+  sigma << gain, shift, shift, scale, rotation;
+  return sigma.cwiseAbs2().cwiseInverse();
+}
+
+void PoseAligner::project(const PoseScale& scale, const PosePicture& picture, const Misalignment& p) {
+  scale.warp(picture, p, true, warped_);
+  projected_.resize(scale.basis.cols(), warped_.cols());
+  multiply_transposed_six(scale.basis.data(), static_cast<int>(scale.basis.rows()),
+                          static_cast<int>(scale.basis.cols()), warped_.data(), projected_.data());
+  projected_.col(0) -= scale.mean;
+  prepare(p);
+}
+
+void PoseAligner::prepare(const Misalignment& p) {
+  const Eigen::MatrixXd tangents = projected_.rightCols(5).cast<double>();
+  const Vector5 undone = as_vector(p);
+  const Vector5 pull = options_.noise * precision_.cwiseProduct(undone);
+  Eigen::Matrix<double, 5, 5> normal = tangents.transpose() * tangents;
+  normal.diagonal() += options_.noise * precision_;
+  inverse_ = normal.inverse();
+  prior_pull_ = pull;
+  prior_cost_ = undone.dot(pull);
+}
+
+double PoseAligner::cost_at(const float* point, Vector5* x) const {
+  const auto dims = static_cast<int>(projected_.rows());
+  float squared = 0.0F;
+  float products[5] = {};
+  residual_products(point, projected_.data(), dims, squared, products);
+  Vector5 b;
+  for (int i = 0; i < 5; ++i) {
+    b(i) = static_cast<double>(products[i]) - prior_pull_(i);
+  }
+  const Vector5 best = inverse_ * b;
+  if (x != nullptr) {
+    *x = best;
+  }
+  return static_cast<double>(squared) + prior_cost_ - b.dot(best);
+}
+
+void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std::size_t start,
+                         AlignedPose& end) {
+  const auto& counts = space.sample_counts();
+  std::size_t here = start;
+  Misalignment p;
+  Vector5 x;
+  double best = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < options_.rounds; ++round) {
+    project(space.coarse(), picture, p);
+    // Coordinate-wise descent over the grid within reach: exact for one DOF.
+    std::size_t found = here;
+    double lowest = cost_at(space.samples().col(static_cast<Eigen::Index>(here)).data(), nullptr);
+    for (std::size_t a = 0; a < counts.size(); ++a) {
+      const int reach = std::max(1, static_cast<int>(std::lround(options_.reach * counts[a])));
+      const std::size_t centre = found;
+      for (int s = -reach; s <= reach; ++s) {
+        const std::ptrdiff_t t = neighbour(space, centre, a, s);
+        if (t < 0) {
+          continue;
+        }
+        const double cost = cost_at(space.samples().col(t).data(), nullptr);
+        if (cost < lowest) {
+          lowest = cost;
+          found = static_cast<std::size_t>(t);
+        }
+      }
+    }
+    cost_at(space.samples().col(static_cast<Eigen::Index>(found)).data(), &x);
+    const bool settled = found == here && round > 0 && lowest > best - 1e-3 * options_.noise - 1e-3 * best;
+    here = found;
+    best = lowest;
+    Vector5 moved = as_vector(p) + x;
+    const Vector5 limit = 4.0 * precision_.cwiseInverse().cwiseSqrt();
+    moved = moved.cwiseMax(-limit).cwiseMin(limit);
+    if (settled || round + 1 == options_.rounds) {
+      end.misalignment = as_misalignment(moved);
+      break;
+    }
+    p = as_misalignment(moved);
+  }
+  end.cost = best;
+  end.fine_cost = best;
+  const auto dofs = static_cast<std::size_t>(space.sample_poses().rows());
+  end.q.resize(dofs);
+  end.q_sigma.assign(dofs, std::numeric_limits<double>::infinity());
+  for (std::size_t a = 0; a < dofs; ++a) {
+    const double q = space.sample_poses()(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(here));
+    end.q[a] = q;
+    const std::ptrdiff_t before = neighbour(space, here, a, -1);
+    const std::ptrdiff_t after = neighbour(space, here, a, 1);
+    if (counts[a] < 3 || before < 0 || after < 0) {
+      continue;
+    }
+    const double left = cost_at(space.samples().col(before).data(), nullptr);
+    const double right = cost_at(space.samples().col(after).data(), nullptr);
+    const double curvature = left - 2.0 * best + right;
+    const Dof& dof = space.coarse_manifold().axes()[a].dof;
+    const double step = dof.difference(space.sample_poses()(static_cast<Eigen::Index>(a), after), q);
+    if (curvature > 0.0) {
+      end.q[a] = dof.canonical(q + step * std::clamp(0.5 * (left - right) / curvature, -1.0, 1.0));
+      // The cost is a squared distance whose expected value at the truth is D·variance; ½·curvature = 1/σ² ·
+      // variance.
+      end.q_sigma[a] = step * std::sqrt(2.0 * std::max(best, options_.noise) /
+                                        (curvature * static_cast<double>(projected_.rows())));
+    }
+  }
+}
+
+double PoseAligner::fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose) {
+  project(space.fine(), picture, pose.misalignment);
+  const Dof& dof = space.fine_manifold().axes()[0].dof;
+  double lowest = std::numeric_limits<double>::infinity();
+  std::vector<double> q = pose.q;
+  const double step = dof.period() / 360.0;
+  for (int s = -5; s <= 5; ++s) {
+    q[0] = pose.q[0] + s * step;
+    const Eigen::VectorXf point = space.fine_manifold().evaluate(q).cast<float>();
+    lowest = std::min(lowest, cost_at(point.data(), nullptr));
+  }
+  return lowest;
+}
+
+const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, const PoseSpace& space) {
+  project(space.coarse(), picture, {});
+  const auto total = static_cast<std::size_t>(space.samples().cols());
+  costs_.resize(total);
+  for (std::size_t t = 0; t < total; ++t) {
+    costs_[t] = cost_at(space.samples().col(static_cast<Eigen::Index>(t)).data(), nullptr);
+  }
+  minima_.clear();
+  for (std::size_t t = 0; t < total; ++t) {
+    bool lowest = true;
+    for (std::size_t a = 0; a < space.sample_counts().size() && lowest; ++a) {
+      for (const int s : {-1, 1}) {
+        const std::ptrdiff_t n = neighbour(space, t, a, s);
+        lowest = lowest && (n < 0 || costs_[t] <= costs_[static_cast<std::size_t>(n)]);
+      }
+    }
+    if (lowest) {
+      minima_.push_back(t);
+    }
+  }
+  const auto starts = std::min(minima_.size(), static_cast<std::size_t>(options_.starts));
+  std::partial_sort(minima_.begin(), minima_.begin() + static_cast<std::ptrdiff_t>(starts), minima_.end(),
+                    [this](std::size_t a, std::size_t b) { return costs_[a] < costs_[b]; });
+  poses_.clear();
+  for (std::size_t i = 0; i < starts; ++i) {
+    AlignedPose pose;
+    follow(picture, space, minima_[i], pose);
+    const bool known = std::any_of(poses_.begin(), poses_.end(), [&](const AlignedPose& other) {
+      const auto axes = space.coarse_manifold().axes();
+      for (std::size_t a = 0; a < axes.size(); ++a) {
+        if (std::fabs(axes[a].dof.difference(pose.q[a], other.q[a])) > 0.01 * axes[a].dof.period()) {
+          return false;
+        }
+      }
+      return true;
+    });
+    if (!known) {
+      poses_.push_back(std::move(pose));
+    }
+  }
+  if (options_.fine && poses_.size() > 1) {
+    for (AlignedPose& pose : poses_) {
+      pose.fine_cost = fine_cost(picture, space, pose);
+    }
+  }
+  std::stable_sort(poses_.begin(), poses_.end(),
+                   [](const AlignedPose& a, const AlignedPose& b) { return a.fine_cost < b.fine_cost; });
+  return poses_;
+}
+
+}  // namespace eigenpose

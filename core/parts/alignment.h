@@ -1,0 +1,77 @@
+#pragma once
+
+/// Pose and misalignment found together (eq. 8's manifold, moved by the tangents of imperfect segmentation).
+///
+/// For a region f, a manifold M(q) and the tangents J of shift, scale, rotation and gain, every sampled pose
+/// has its best misalignment in closed form: (JᵀJ + νΛ)x = Jᵀ(M(q) − f) − νΛp, where Λ = diag 1/σ² is what is
+/// likely and p what was undone before. The deepest minima over the pose are followed by Gauss–Newton rounds
+/// that warp the region anew, then compared at the fine scale. ν, learned from the views, is the error
+/// variance that the spline leaves.
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/parts/pose_space.h"
+
+namespace eigenpose {
+
+/// How large misalignments are expected to be (1 σ).
+struct AlignmentPrior {
+  double gain = 0.1;
+  double shift = 2.0 / 128.0;  ///< share of the region's side
+  double scale = 0.03;
+  double rotation = 3.0 * 0.017453292519943295;  ///< radians
+
+  [[nodiscard]] Eigen::Matrix<double, 5, 1> precision() const;
+};
+
+struct AlignmentOptions {
+  AlignmentPrior prior;
+  double noise = 1e-4;        ///< ν, squared length between unit-energy appearances
+  int starts = 6;             ///< minima over the pose that are followed
+  int rounds = 6;             ///< Gauss–Newton rounds each
+  double reach = 20.0 / 360;  ///< how far a round may move the pose, as a share of a periodic DOF's range
+  bool fine = true;           ///< compare the ends at the fine scale
+};
+
+/// One pose that fits a region.
+struct AlignedPose {
+  std::vector<double> q;
+  Misalignment misalignment;
+  double cost = 0.0;            ///< squared distance after alignment plus νpᵀΛp, coarse scale
+  double fine_cost = 0.0;       ///< the same at the fine scale where it was compared, else the coarse one
+  std::vector<double> q_sigma;  ///< 1 σ of each DOF from the curvature of the cost
+};
+
+/// Aligns regions with pose spaces. Holds scratch memory: one thread at a time.
+class PoseAligner {
+ public:
+  explicit PoseAligner(AlignmentOptions options) : options_(options), precision_(options.prior.precision()) {}
+
+  /// Poses of `space` that fit, best first, different from each other. Valid until the next call.
+  const std::vector<AlignedPose>& align(const PosePicture& picture, const PoseSpace& space);
+
+ private:
+  void project(const PoseScale& scale, const PosePicture& picture, const Misalignment& p);
+  void prepare(const Misalignment& p);
+  /// Cost of one manifold point after its best misalignment, which goes to `x`.
+  double cost_at(const float* point, Eigen::Matrix<double, 5, 1>* x) const;
+  void follow(const PosePicture& picture, const PoseSpace& space, std::size_t start, AlignedPose& end);
+  double fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose);
+
+  AlignmentOptions options_;
+  Eigen::Matrix<double, 5, 1> precision_;
+  Eigen::MatrixXf warped_;     ///< pixels × 6
+  Eigen::MatrixXf projected_;  ///< D × 6: f, then J
+  Eigen::Matrix<double, 5, 5> inverse_;
+  Eigen::Matrix<double, 5, 1> prior_pull_;
+  double prior_cost_ = 0.0;
+  std::vector<double> costs_;
+  std::vector<std::size_t> minima_;
+  std::vector<AlignedPose> poses_;
+};
+
+}  // namespace eigenpose

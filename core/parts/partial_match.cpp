@@ -1,0 +1,165 @@
+#include "core/parts/partial_match.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace eigenpose {
+namespace {
+
+/// exp(−x) for x ≥ 0 from a table: relative error below 1 %, 0 beyond 16.
+float fast_exp_of_minus(float x) {
+  constexpr int per_unit = 64;
+  constexpr int size = 16 * per_unit;
+  static const std::array<float, size> table = [] {
+    std::array<float, size> made{};
+    for (int i = 0; i < size; ++i) {
+      made[static_cast<std::size_t>(i)] = std::exp(-(static_cast<float>(i) + 0.5F) / per_unit);
+    }
+    return made;
+  }();
+  const int i = static_cast<int>(x * per_unit);
+  return i < 0 ? 1.0F : i < size ? table[static_cast<std::size_t>(i)] : 0.0F;
+}
+
+}  // namespace
+
+void make_query_windows(const CellMap& map, const WindowSpace& space, const WindowScale& scale,
+                        const VotingOptions& options, QueryWindows& out) {
+  thread_local Eigen::MatrixXf coordinates;
+  space.project(map, QueryWindows::stride, coordinates, &out.weights);
+  out.windows.resize(static_cast<std::size_t>(coordinates.cols()));
+  out.total_weight = 0.0F;
+  for (Eigen::Index i = 0; i < coordinates.cols(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    out.windows[at] = quantize_query(coordinates.col(i).data(), scale);
+    out.weights[at] = out.weights[at] / space.mean_mass() + options.floor_weight;
+    out.total_weight += out.weights[at];
+  }
+}
+
+PartialMatcher::PartialMatcher(std::span<const PartsObject> objects, const WindowScale& scale,
+                               VotingOptions options)
+    : objects_(objects), scale_(scale), options_(options) {}
+
+float PartialMatcher::likeness(float energy, std::int32_t score) const {
+  const float squared = energy - 2.0F * scale_.product() * static_cast<float>(score);
+  return fast_exp_of_minus(std::max(squared, 0.0F) / (2.0F * options_.width * options_.width));
+}
+
+std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
+                                                   std::span<const std::size_t> shortlist) {
+  query_ = &query;
+  constexpr std::size_t absent = std::numeric_limits<std::size_t>::max();
+  offsets_.assign(objects_.size(), absent);
+  row_length_ = 0;
+  std::size_t most_lanes = 0;
+  for (const std::size_t o : shortlist) {
+    offsets_[o] = row_length_;
+    row_length_ += objects_[o].candidates.size();
+    most_lanes = std::max(most_lanes, objects_[o].store.groups() * WindowStore::group);
+  }
+  const std::size_t count = query.windows.size();
+  scores_.resize(count * row_length_);
+  lanes_.resize(most_lanes);
+  // One object after the other: its windows stay in the cache for all windows of the query.
+  for (const std::size_t o : shortlist) {
+    const PartsObject& object = objects_[o];
+    for (std::size_t w = 0; w < count; ++w) {
+      const int row = static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride;
+      const int column = static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride;
+      object.store.best_scores(query.windows[w], row, column, options_.tolerance, scale_, lanes_.data());
+      std::int32_t* out = scores_.data() + w * row_length_ + offsets_[o];
+      std::fill_n(out, object.candidates.size(), std::numeric_limits<std::int32_t>::min());
+      for (std::size_t lane = 0; lane < object.lane_candidate.size(); ++lane) {
+        std::int32_t& best = out[object.lane_candidate[lane]];
+        best = std::max(best, lanes_[lane]);
+      }
+    }
+  }
+
+  votes_.assign(row_length_, 0.0F);
+  background_.assign(count, 0.0F);
+  std::vector<std::int32_t> bests(shortlist.size());
+  std::vector<std::int32_t> sorted;
+  std::vector<float> kappas;
+  const auto rank = static_cast<std::size_t>(options_.background_rank);
+  for (std::size_t w = 0; w < count; ++w) {
+    const std::int32_t* row = scores_.data() + w * row_length_;
+    for (std::size_t i = 0; i < shortlist.size(); ++i) {
+      const std::size_t o = shortlist[i];
+      bests[i] = *std::max_element(row + offsets_[o], row + offsets_[o] + objects_[o].candidates.size());
+    }
+    std::int32_t floor = std::numeric_limits<std::int32_t>::min();
+    if (shortlist.size() > rank) {
+      sorted = bests;
+      std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1), sorted.end(),
+                       std::greater<>());
+      floor = sorted[rank - 1];
+      background_[w] = likeness(query.windows[w].energy, floor);
+    }
+    for (std::size_t i = 0; i < shortlist.size(); ++i) {
+      if (bests[i] <= floor) {
+        continue;
+      }
+      const PartsObject& object = objects_[shortlist[i]];
+      const std::int32_t* scores = row + offsets_[shortlist[i]];
+      float* votes = votes_.data() + offsets_[shortlist[i]];
+      const std::size_t candidates = object.candidates.size();
+      kappas.resize(candidates);
+      for (std::size_t c = 0; c < candidates; ++c) {
+        kappas[c] = likeness(query.windows[w].energy, scores[c]);
+      }
+      for (std::size_t c = 0; c < candidates; ++c) {
+        float kappa = kappas[c];
+        for (const int n : object.neighbours[c]) {
+          if (n >= 0) {
+            kappa = std::max(kappa, options_.pooling * kappas[static_cast<std::size_t>(n)]);
+          }
+        }
+        votes[c] += query.weights[w] * std::max(0.0F, kappa - background_[w]);
+      }
+    }
+  }
+
+  result_.clear();
+  for (const std::size_t o : shortlist) {
+    const float* votes = votes_.data() + offsets_[o];
+    const float* best = std::max_element(votes, votes + objects_[o].candidates.size());
+    result_.push_back({o, *best, static_cast<int>(best - votes)});
+  }
+  std::stable_sort(result_.begin(), result_.end(),
+                   [](const PartialVote& a, const PartialVote& b) { return a.score > b.score; });
+  return result_;
+}
+
+std::vector<float> PartialMatcher::plain_votes(const QueryWindows& query, std::size_t object) const {
+  std::vector<float> votes(objects_[object].candidates.size(), 0.0F);
+  for (std::size_t w = 0; w < query.windows.size(); ++w) {
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
+    for (std::size_t c = 0; c < votes.size(); ++c) {
+      votes[c] += query.weights[w] * likeness(query.windows[w].energy, scores[c]);
+    }
+  }
+  return votes;
+}
+
+void PartialMatcher::window_likeness(std::size_t object, int candidate, std::vector<float>& likeness_of,
+                                     std::vector<float>& background) const {
+  const std::size_t count = query_->windows.size();
+  likeness_of.resize(count);
+  background = background_;
+  for (std::size_t w = 0; w < count; ++w) {
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
+    float kappa = likeness(query_->windows[w].energy, scores[candidate]);
+    for (const int n : objects_[object].neighbours[static_cast<std::size_t>(candidate)]) {
+      if (n >= 0) {
+        kappa = std::max(kappa, likeness(query_->windows[w].energy, scores[n]));
+      }
+    }
+    likeness_of[w] = kappa;
+  }
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,44 @@
+#pragma once
+
+/// What is learned for partial matching and for alignment: the windows and the pose space of every object.
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/parts/partial_match.h"
+#include "core/parts/pose_space.h"
+#include "core/parts/windows.h"
+
+namespace eigenpose {
+
+/// How far an object's own views may lie from what was learned of it: scores of left-out and of moved learned
+/// views. A score is the share of window votes that the best pose does not get, after alignment: 0 is
+/// perfect, 1 nothing in common.
+struct PartsCalibration {
+  std::vector<double> scores;    ///< ascending, one a learned view (or its substitute)
+  double rejection_score = 1.0;  ///< a region with a larger score is unknown
+  double covered_share = 0.1;    ///< a region with a larger share of foreign windows is taken as covered
+};
+
+/// Everything partial matching and alignment know. Immutable once learned; share it between threads.
+struct PartsModel {
+  int bands = 1;
+  std::array<float, 3> background{};  ///< root brightness, see CellMapper
+  WindowSpace space;
+  WindowScale scale;
+  VotingOptions voting;
+  double noise = 1e-4;  ///< ν of the alignment: error variance that the splines leave
+  std::vector<PartsObject> objects;
+  std::vector<PoseSpace> poses;               ///< one an object
+  std::vector<PartsCalibration> calibration;  ///< one an object
+
+  /// Bytes held for one object.
+  [[nodiscard]] std::size_t memory(std::size_t object) const {
+    return objects[object].store.memory() + poses[object].memory();
+  }
+};
+
+}  // namespace eigenpose

@@ -1,0 +1,282 @@
+#include "core/parts/parts_recognizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/parts/masked_alignment.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr double window_count = QueryWindows::count;  // each window counts as one observation
+constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
+constexpr std::size_t most_revoted = 3;
+constexpr std::size_t most_covered_poses = 3;
+constexpr float foreign_likeness = 0.3F;   // a window less alike than this is foreign to the object
+constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
+constexpr double masked_reach = 12.0 / 360.0;
+
+/// The picture with a misalignment undone.
+void undo(const cv::Mat& picture, const Misalignment& m, cv::Mat& out) {
+  const double n = picture.cols;
+  const double cosine = (1.0 + m.scale) * std::cos(m.rotation);
+  const double sine = (1.0 + m.scale) * std::sin(m.rotation);
+  const double middle = 0.5 * n - 0.5;
+  const cv::Matx23d map(cosine, -sine, middle + n * m.dx - cosine * middle + sine * middle, sine, cosine,
+                        middle + n * m.dy - sine * middle - cosine * middle);
+  cv::warpAffine(picture, out, map, picture.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                 cv::BORDER_REPLICATE);
+}
+
+/// Votes of the learned views next to a pose: the best of those within one step in every DOF.
+double votes_near(const std::vector<float>& votes, const PartsObject& object, const PoseSpace& space,
+                  const std::vector<double>& q) {
+  const auto axes = space.coarse_manifold().axes();
+  double best = 0.0;
+  for (std::size_t c = 0; c < object.candidates.size(); ++c) {
+    if (object.candidates[c].mirrored) {
+      continue;
+    }
+    std::size_t rest = static_cast<std::size_t>(object.candidates[c].view);
+    bool near = true;
+    for (std::size_t a = axes.size(); a-- > 0 && near;) {
+      const std::size_t count = axes[a].samples.size();
+      const double sample = axes[a].samples[rest % count];
+      rest /= count;
+      // One learned step, with room for uneven ones.
+      near = std::fabs(axes[a].dof.difference(q[a], sample)) <=
+             1.01 * axes[a].dof.period() / static_cast<double>(count);
+    }
+    if (near) {
+      best = std::max(best, static_cast<double>(votes[c]));
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+struct PartsRecognizer::Impl {
+  explicit Impl(const PartsModel& learned)
+      : model(learned),
+        mapper(learned.background),
+        matcher(learned.objects, learned.scale, learned.voting),
+        rematcher(learned.objects, learned.scale, learned.voting),
+        aligner([&] {
+          options.noise = learned.noise;
+          return options;
+        }()) {
+    everything.resize(learned.objects.size());
+    std::iota(everything.begin(), everything.end(), std::size_t{0});
+  }
+
+  const PartsModel& model;
+  AlignmentOptions options;
+  CellMapper mapper;
+  PartialMatcher matcher;    ///< of the picture as it is
+  PartialMatcher rematcher;  ///< of the picture aligned with one pose
+  PoseAligner aligner;
+  std::vector<std::size_t> everything;
+  cv::Mat picture;
+  cv::Mat aligned;
+  CellMap map;
+  QueryWindows windows;
+  QueryWindows aligned_windows;
+  PosePicture pose_picture;
+  std::vector<PartialVote> votes;
+  std::vector<float> likeness;
+  std::vector<float> background;
+
+  double share_after_alignment(std::size_t object, const PartsPose& pose);
+  double foreign_share(std::size_t object, int candidate);
+  void find_poses(std::size_t object, const std::vector<float>& plain, PartsAnswer& answer);
+  void find_covered_poses(std::size_t object, const std::vector<float>& plain, PartsAnswer& answer);
+  /// The pose of a candidate, moved by the parabola through its neighbours' votes.
+  [[nodiscard]] std::vector<double> voted_pose(std::size_t object, const std::vector<float>& plain,
+                                               int candidate) const;
+  [[nodiscard]] std::vector<float> pixel_trust() const;
+};
+
+double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const PartsPose& pose) {
+  undo(picture, pose.misalignment, aligned);
+  mapper.compute(aligned, map);
+  make_query_windows(map, model.space, model.scale, model.voting, aligned_windows);
+  rematcher.match(aligned_windows, {&object, 1});
+  return votes_near(rematcher.plain_votes(aligned_windows, object), model.objects[object],
+                    model.poses[object], pose.q) /
+         aligned_windows.total_weight;
+}
+
+double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
+  matcher.window_likeness(object, candidate, likeness, background);
+  const auto foreign =
+      std::count_if(likeness.begin(), likeness.end(), [](float k) { return k < foreign_likeness; });
+  return static_cast<double>(foreign) / static_cast<double>(likeness.size());
+}
+
+std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
+  // Every window lends its trust to the cells it covers; a pixel has the mean of its cell's windows.
+  constexpr int cells = CellMap::cells;
+  std::array<float, cells * cells> sum{};
+  std::array<float, cells * cells> count{};
+  for (std::size_t w = 0; w < likeness.size(); ++w) {
+    const float trust =
+        std::clamp((likeness[w] - foreign_likeness) / (familiar_likeness - foreign_likeness), 0.0F, 1.0F);
+    const int row = static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride - CellMap::pad;
+    const int column = static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride - CellMap::pad;
+    for (int r = std::max(row, 0); r < std::min(row + WindowGrid::window, cells); ++r) {
+      for (int c = std::max(column, 0); c < std::min(column + WindowGrid::window, cells); ++c) {
+        sum[static_cast<std::size_t>(r * cells + c)] += trust;
+        count[static_cast<std::size_t>(r * cells + c)] += 1.0F;
+      }
+    }
+  }
+  constexpr int side = 32;
+  std::vector<float> weights(static_cast<std::size_t>(side) * side);
+  for (int r = 0; r < side; ++r) {
+    for (int c = 0; c < side; ++c) {
+      const auto cell = static_cast<std::size_t>(r * cells / side * cells + c * cells / side);
+      const float mean = sum[cell] / std::max(count[cell], 1.0F);
+      weights[static_cast<std::size_t>(r * side + c)] = mean * mean;
+    }
+  }
+  return weights;
+}
+
+void PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<float>& plain,
+                                       PartsAnswer& answer) {
+  const PartsObject& parts = model.objects[object];
+  const PoseSpace& space = model.poses[object];
+  const auto merit = [&](const PartsPose& pose) {
+    return window_count * pose.votes - 0.5 * pose.cost / model.noise;
+  };
+  for (const AlignedPose& found : aligner.align(pose_picture, space)) {
+    PartsPose pose{found.q, found.q_sigma, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+                   0.0};
+    pose.votes = votes_near(plain, parts, space, pose.q) / windows.total_weight;
+    pose.merit = merit(pose);
+    answer.poses.push_back(std::move(pose));
+  }
+  const auto better = [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; };
+  std::stable_sort(answer.poses.begin(), answer.poses.end(), better);
+  const double best = answer.poses.front().merit;
+  for (std::size_t i = 0; i < std::min(answer.poses.size(), most_revoted); ++i) {
+    PartsPose& pose = answer.poses[i];
+    if (pose.merit < best - close_merit) {
+      break;
+    }
+    const double share = share_after_alignment(object, pose);
+    answer.score = std::min(answer.score, 1.0 - share);
+    pose.votes = 0.5 * (pose.votes + share);
+    pose.merit = merit(pose);
+  }
+  std::stable_sort(answer.poses.begin(), answer.poses.end(), better);
+}
+
+std::vector<double> PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
+                                                      int candidate) const {
+  const PartsObject& parts = model.objects[object];
+  const auto axes = model.poses[object].coarse_manifold().axes();
+  std::vector<double> q(axes.size());
+  std::size_t rest = static_cast<std::size_t>(parts.candidates[static_cast<std::size_t>(candidate)].view);
+  for (std::size_t a = axes.size(); a-- > 0;) {
+    q[a] = axes[a].samples[rest % axes[a].samples.size()];
+    rest /= axes[a].samples.size();
+  }
+  const auto& near = parts.neighbours[static_cast<std::size_t>(candidate)];
+  if (axes.size() == 1 && near[0] >= 0 && near[1] >= 0) {
+    const double after = plain[static_cast<std::size_t>(near[0])];
+    const double before = plain[static_cast<std::size_t>(near[1])];
+    const double curvature = after - 2.0 * plain[static_cast<std::size_t>(candidate)] + before;
+    if (curvature < 0.0) {
+      const double step = axes[0].dof.period() / static_cast<double>(axes[0].samples.size());
+      q[0] = axes[0].dof.canonical(q[0] + step * std::clamp(0.5 * (before - after) / curvature, -1.0, 1.0));
+    }
+  }
+  return q;
+}
+
+void PartsRecognizer::Impl::find_covered_poses(std::size_t object, const std::vector<float>& plain,
+                                               PartsAnswer& answer) {
+  const PartsObject& parts = model.objects[object];
+  // Views with more votes than their neighbours, most votes first.
+  std::vector<int> peaks;
+  for (std::size_t c = 0; c < plain.size(); ++c) {
+    const auto& near = parts.neighbours[c];
+    if (!parts.candidates[c].mirrored &&
+        (near[0] < 0 || plain[c] >= plain[static_cast<std::size_t>(near[0])]) &&
+        (near[1] < 0 || plain[c] >= plain[static_cast<std::size_t>(near[1])])) {
+      peaks.push_back(static_cast<int>(c));
+    }
+  }
+  std::sort(peaks.begin(), peaks.end(), [&](int a, int b) {
+    return plain[static_cast<std::size_t>(a)] > plain[static_cast<std::size_t>(b)];
+  });
+  peaks.resize(std::min(peaks.size(), most_covered_poses));
+  // What the best view trusts is what all poses are compared on.
+  foreign_share(object, peaks.front());
+  const std::vector<float> trust = pixel_trust();
+  for (const int peak : peaks) {
+    const AlignedPose found = align_masked(pose_picture, model.poses[object], options, trust,
+                                           voted_pose(object, plain, peak), masked_reach);
+    PartsPose pose{found.q,
+                   found.q_sigma,
+                   found.misalignment,
+                   found.cost,
+                   plain[static_cast<std::size_t>(peak)] / windows.total_weight,
+                   0.0};
+    // The noise of a covered region is not known: it is estimated from the residual itself.
+    pose.merit = window_count * (pose.votes - 0.5 * std::log(std::max(found.cost, model.noise)));
+    answer.poses.push_back(std::move(pose));
+  }
+  std::stable_sort(answer.poses.begin(), answer.poses.end(),
+                   [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
+  answer.score = 1.0 - answer.poses.front().votes;
+}
+
+PartsRecognizer::PartsRecognizer(const PartsModel& model) : impl_(std::make_unique<Impl>(model)) {}
+PartsRecognizer::~PartsRecognizer() = default;
+PartsRecognizer::PartsRecognizer(PartsRecognizer&&) noexcept = default;
+PartsRecognizer& PartsRecognizer::operator=(PartsRecognizer&&) noexcept = default;
+
+void PartsRecognizer::look(const cv::Mat& picture) {
+  if (picture.rows == CellMap::pixels) {
+    picture.copyTo(impl_->picture);
+  } else {
+    cv::resize(picture, impl_->picture, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
+  }
+  impl_->mapper.compute(impl_->picture, impl_->map);
+  make_query_windows(impl_->map, impl_->model.space, impl_->model.scale, impl_->model.voting, impl_->windows);
+  make_pose_picture(impl_->picture, impl_->pose_picture);
+}
+
+std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> shortlist) {
+  return impl_->matcher.match(
+      impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
+}
+
+PartsAnswer PartsRecognizer::settle(std::size_t object) {
+  Impl& impl = *impl_;
+  PartsAnswer answer;
+  answer.object = object;
+  const PartsObject& parts = impl.model.objects[object];
+  const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, object);
+  int best = 0;
+  for (std::size_t c = 0; c < plain.size(); ++c) {
+    if (!parts.candidates[c].mirrored && plain[c] > plain[static_cast<std::size_t>(best)]) {
+      best = static_cast<int>(c);
+    }
+  }
+  answer.covered = impl.foreign_share(object, best);
+  if (answer.covered > impl.model.calibration[object].covered_share) {
+    impl.find_covered_poses(object, plain, answer);
+  } else {
+    impl.find_poses(object, plain, answer);
+  }
+  return answer;
+}
+
+}  // namespace eigenpose

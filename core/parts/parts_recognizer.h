@@ -1,0 +1,56 @@
+#pragma once
+
+/// Which object a region shows, and its pose with the misalignment undone: partial matching and alignment
+/// together.
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/parts/alignment.h"
+#include "core/parts/parts_model.h"
+
+namespace eigenpose {
+
+/// One object and pose that windows and alignment agree on.
+struct PartsPose {
+  std::vector<double> q;
+  std::vector<double> q_sigma;
+  Misalignment misalignment;
+  double cost = 0.0;   ///< squared distance in the pose space after alignment
+  double votes = 0.0;  ///< share of the windows' weight that votes for this pose, 0…1
+  double merit = 0.0;  ///< log-likelihood up to a constant: votes and distance together
+};
+
+/// The answer for one region.
+struct PartsAnswer {
+  std::size_t object = 0;
+  std::optional<std::size_t> runner_up;
+  double runner_up_share = 0.0;  ///< votes of the second object over those of the first, 0…1
+  std::vector<PartsPose> poses;  ///< of `object`, best first, never empty
+  double score = 1.0;            ///< 1 − votes of the best pose; compare with the object's rejection score
+  double covered = 0.0;          ///< share of the windows' weight that does not belong to the object, 0…1
+};
+
+/// Recognises normalised regions. Holds scratch memory: one thread at a time; the model outlives it.
+class PartsRecognizer {
+ public:
+  explicit PartsRecognizer(const PartsModel& model);
+  ~PartsRecognizer();
+  PartsRecognizer(PartsRecognizer&&) noexcept;
+  PartsRecognizer& operator=(PartsRecognizer&&) noexcept;
+
+  /// Takes a square 8-bit picture with the model's bands. Call before the others.
+  void look(const cv::Mat& picture);
+  /// Votes of all objects (or of `shortlist`), most first.
+  std::span<const PartialVote> vote(std::span<const std::size_t> shortlist = {});
+  /// Pose of one object in the picture looked at, once it has been voted on.
+  PartsAnswer settle(std::size_t object);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace eigenpose

@@ -1,0 +1,215 @@
+#include "core/parts/pose_space.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <Eigen/Eigenvalues>
+#include <opencv2/imgproc.hpp>
+
+namespace eigenpose {
+namespace {
+
+constexpr double coarse_blur = 1.5;  // pixels of the 64×64 picture
+constexpr std::size_t most_samples = 4096;
+
+/// Bilinear value and central differences of a 64×64 picture; outside its edge it goes on as it ends.
+struct Sampler {
+  const float* pixels;
+
+  [[nodiscard]] float at(float x, float y) const {
+    constexpr auto last = static_cast<float>(PosePicture::side - 1);
+    x = std::clamp(x, 0.0F, last);
+    y = std::clamp(y, 0.0F, last);
+    const int ix = std::min(static_cast<int>(x), PosePicture::side - 2);
+    const int iy = std::min(static_cast<int>(y), PosePicture::side - 2);
+    const float fx = x - static_cast<float>(ix);
+    const float fy = y - static_cast<float>(iy);
+    const float* p = pixels + iy * PosePicture::side + ix;
+    const float top = p[0] + fx * (p[1] - p[0]);
+    const float bottom = p[PosePicture::side] + fx * (p[PosePicture::side + 1] - p[PosePicture::side]);
+    return top + fy * (bottom - top);
+  }
+};
+
+/// Eigenvectors of all dimensions that centred unit-energy pictures span.
+void span_of(const Eigen::MatrixXf& pictures, int side, PoseScale& scale, Eigen::MatrixXd& points) {
+  const Eigen::VectorXf mean = pictures.rowwise().mean();
+  const Eigen::MatrixXd centred = (pictures.colwise() - mean).cast<double>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(centred.transpose() * centred);
+  const Eigen::Index views = pictures.cols();
+  const double largest = std::max(solver.eigenvalues()(views - 1), 1e-12);
+  Eigen::Index kept = 0;
+  while (kept < views - 1 && solver.eigenvalues()(views - 1 - kept) > 1e-6 * largest) {
+    ++kept;
+  }
+  kept = std::max<Eigen::Index>(kept, 1);
+  scale.side = side;
+  scale.basis.resize(pictures.rows(), kept);
+  for (Eigen::Index k = 0; k < kept; ++k) {
+    const Eigen::VectorXd vector = centred * solver.eigenvectors().col(views - 1 - k);
+    scale.basis.col(k) = (vector / std::max(vector.norm(), 1e-12)).cast<float>();
+  }
+  scale.mean = scale.basis.transpose() * mean;
+  points = scale.basis.cast<double>().transpose() * centred;
+}
+
+}  // namespace
+
+void make_pose_picture(const cv::Mat& picture, PosePicture& out) {
+  constexpr int n = PosePicture::side;
+  cv::Mat grey;
+  if (picture.channels() == 3) {
+    cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+  } else {
+    grey = picture;
+  }
+  if (grey.rows != n || grey.cols != n) {
+    cv::resize(grey, grey, cv::Size(n, n), 0.0, 0.0, cv::INTER_AREA);
+  }
+  out.sharp.resize(static_cast<std::size_t>(n) * n);
+  out.blurred.resize(out.sharp.size());
+  cv::Mat sharp(n, n, CV_32FC1, out.sharp.data());
+  grey.convertTo(sharp, CV_32F, 1.0 / 255.0);
+  cv::Mat blurred(n, n, CV_32FC1, out.blurred.data());
+  cv::GaussianBlur(sharp, blurred, cv::Size(9, 9), coarse_blur, coarse_blur, cv::BORDER_REPLICATE);
+}
+
+void PoseScale::warp(const PosePicture& picture, const Misalignment& misalignment, bool derivatives,
+                     Eigen::MatrixXf& out) const {
+  const Sampler sampler{side == PosePicture::side ? picture.sharp.data() : picture.blurred.data()};
+  const auto n = static_cast<float>(PosePicture::side);
+  const float step = n / static_cast<float>(side);
+  const float enlarge = static_cast<float>(1.0 + misalignment.scale);
+  const float cosine = enlarge * static_cast<float>(std::cos(misalignment.rotation));
+  const float sine = enlarge * static_cast<float>(std::sin(misalignment.rotation));
+  const float middle = 0.5F * n;
+  const float cx = middle + n * static_cast<float>(misalignment.dx) - 0.5F;
+  const float cy = middle + n * static_cast<float>(misalignment.dy) - 0.5F;
+  out.resize(static_cast<Eigen::Index>(side) * side, 1 + Misalignment::unknowns);
+  float* value = out.col(0).data();
+  float* by_gain = out.col(1).data();
+  float* by_x = out.col(2).data();
+  float* by_y = out.col(3).data();
+  float* by_scale = out.col(4).data();
+  float* by_rotation = out.col(5).data();
+  int i = 0;
+  for (int r = 0; r < side; ++r) {
+    const float v = (static_cast<float>(r) + 0.5F) * step - middle;
+    for (int c = 0; c < side; ++c, ++i) {
+      const float u = (static_cast<float>(c) + 0.5F) * step - middle;
+      const float du = cosine * u - sine * v;
+      const float dv = sine * u + cosine * v;
+      const float x = cx + du;
+      const float y = cy + dv;
+      value[i] = sampler.at(x, y);
+      if (derivatives) {
+        const float gx = 0.5F * (sampler.at(x + 1.0F, y) - sampler.at(x - 1.0F, y));
+        const float gy = 0.5F * (sampler.at(x, y + 1.0F) - sampler.at(x, y - 1.0F));
+        by_x[i] = n * gx;
+        by_y[i] = n * gy;
+        by_scale[i] = (gx * du + gy * dv) / enlarge;
+        by_rotation[i] = gy * du - gx * dv;
+      }
+    }
+  }
+  const float energy = out.col(0).norm();
+  const float scale = static_cast<float>(1.0 + misalignment.gain) / std::max(energy, 1e-9F);
+  out.col(0) *= scale;
+  if (derivatives) {
+    out.rightCols(4) *= scale;
+    for (Eigen::Index k = 0; k < out.rows(); ++k) {
+      by_gain[k] = value[k] / static_cast<float>(1.0 + misalignment.gain);
+    }
+  }
+}
+
+PoseSpace PoseSpace::learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views) {
+  if (views.size() < 2) {
+    throw std::invalid_argument("a pose space needs at least 2 views, got " + std::to_string(views.size()));
+  }
+  PoseSpace space;
+  Eigen::MatrixXd points;
+  for (const int side : {32, 64}) {
+    PoseScale& scale = side == 32 ? space.coarse_ : space.fine_;
+    scale.side = side;
+    Eigen::MatrixXf pictures(static_cast<Eigen::Index>(side) * side, static_cast<Eigen::Index>(views.size()));
+    Eigen::MatrixXf warped;
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      scale.warp(views[v], {}, false, warped);
+      pictures.col(static_cast<Eigen::Index>(v)) = warped.col(0);
+    }
+    if (side == 32) {
+      space.pixel_mean_ = pictures.rowwise().mean();
+    }
+    span_of(pictures, side, scale, points);
+    (side == 32 ? space.coarse_manifold_ : space.fine_manifold_) = Manifold::interpolate(axes, points);
+    if (side == 32 && axes.size() == 1 && views.size() >= 4) {
+      for (std::size_t v = 0; v < views.size(); ++v) {
+        std::vector<SampleAxis> fewer = axes;
+        fewer[0].samples.erase(fewer[0].samples.begin() + static_cast<std::ptrdiff_t>(v));
+        Eigen::MatrixXd rest(points.rows(), points.cols() - 1);
+        const auto at = static_cast<Eigen::Index>(v);
+        rest << points.leftCols(at), points.rightCols(points.cols() - 1 - at);
+        const Manifold manifold = Manifold::interpolate(fewer, rest);
+        const double q = axes[0].samples[v];
+        space.left_out_errors_.push_back((manifold.evaluate({&q, 1}) - points.col(at)).squaredNorm());
+      }
+    }
+  }
+  space.make_samples();
+  return space;
+}
+
+void PoseSpace::make_samples() {
+  const auto axes = coarse_manifold_->axes();
+  std::size_t total = 1;
+  sample_counts_.clear();
+  for (const SampleAxis& axis : axes) {
+    total *= axis.samples.size();
+  }
+  // Between neighbouring views several samples an axis, as many as the limit allows; one DOF gets 1° on a
+  // turntable.
+  const double room = std::pow(static_cast<double>(most_samples) / static_cast<double>(total),
+                               1.0 / static_cast<double>(axes.size()));
+  std::vector<std::vector<double>> values;
+  total = 1;
+  for (const SampleAxis& axis : axes) {
+    const auto views = axis.samples.size();
+    int count = 1;
+    if (views > 1) {
+      count = std::clamp(static_cast<int>(static_cast<double>(views) * room), static_cast<int>(views), 360);
+    }
+    const bool closed = axis.dof.periodic && views > 1;
+    std::vector<double> places;
+    const double first = closed ? axis.dof.lower : axis.samples.front();
+    const double range = closed ? axis.dof.period() : axis.samples.back() - axis.samples.front();
+    for (int i = 0; i < count; ++i) {
+      places.push_back(count == 1 ? first : first + range * i / (closed ? count : count - 1));
+    }
+    sample_counts_.push_back(count);
+    total *= static_cast<std::size_t>(count);
+    values.push_back(std::move(places));
+  }
+  sample_poses_.resize(static_cast<Eigen::Index>(axes.size()), static_cast<Eigen::Index>(total));
+  samples_.resize(coarse_manifold_->dimensions(), static_cast<Eigen::Index>(total));
+  std::vector<double> q(axes.size());
+  for (std::size_t t = 0; t < total; ++t) {
+    std::size_t rest = t;
+    for (std::size_t a = axes.size(); a-- > 0;) {
+      q[a] = values[a][rest % values[a].size()];
+      rest /= values[a].size();
+    }
+    sample_poses_.col(static_cast<Eigen::Index>(t)) =
+        Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
+    samples_.col(static_cast<Eigen::Index>(t)) = coarse_manifold_->evaluate(q).cast<float>();
+  }
+}
+
+std::size_t PoseSpace::memory() const {
+  const auto floats = coarse_.basis.size() + fine_.basis.size() + samples_.size();
+  return static_cast<std::size_t>(floats) * sizeof(float);
+}
+
+}  // namespace eigenpose

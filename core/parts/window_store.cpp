@@ -1,0 +1,88 @@
+#include "core/parts/window_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "core/parts/window_kernels.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr std::int32_t no_view = 1 << 29;  // bias of a place that holds no view
+constexpr std::size_t dims = WindowGrid::components;
+constexpr std::size_t block_bytes = WindowStore::group * dims;
+
+}  // namespace
+
+QueryWindow quantize_query(const float* coordinates, const WindowScale& scale) {
+  QueryWindow window;
+  float energy = 0.0F;
+  for (std::size_t k = 0; k < dims; ++k) {
+    const float step = std::clamp(std::nearbyint(coordinates[k] / scale.query), -63.0F, 63.0F);
+    window.values[k] = static_cast<std::uint8_t>(static_cast<int>(step) + 64);
+    energy += step * step;
+  }
+  window.energy = energy * scale.query * scale.query;
+  return window;
+}
+
+WindowStore::WindowStore(const std::vector<Eigen::MatrixXf>& views, const WindowScale& scale)
+    : views_(views.size()) {
+  constexpr std::size_t positions = WindowGrid::positions;
+  const std::size_t lanes = groups() * group;
+  values_.assign(positions * lanes * dims, 0);
+  biases_.assign(positions * lanes, no_view);
+  for (std::size_t v = 0; v < views_; ++v) {
+    if (views[v].rows() != WindowGrid::components || views[v].cols() != WindowGrid::positions) {
+      throw std::invalid_argument("a view has 32×289 window coordinates, not " +
+                                  std::to_string(views[v].rows()) + "×" + std::to_string(views[v].cols()));
+    }
+    for (std::size_t p = 0; p < positions; ++p) {
+      const std::size_t block = p * groups() + v / group;
+      std::int32_t sum = 0;
+      float energy = 0.0F;
+      for (std::size_t k = 0; k < dims; ++k) {
+        const float coordinate = views[v](static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(p));
+        const float step = std::clamp(std::nearbyint(coordinate / scale.learned), -127.0F, 127.0F);
+        values_[block * block_bytes + k / 4 * 32 + v % group * 4 + k % 4] = static_cast<std::int8_t>(step);
+        sum += static_cast<std::int32_t>(step);
+        energy += step * step;
+      }
+      const float half_energy = 0.5F * energy * scale.learned / scale.query;
+      biases_[block * group + v % group] = 64 * sum + static_cast<std::int32_t>(std::lround(half_energy));
+    }
+  }
+}
+
+WindowStore::WindowStore(std::size_t views, std::vector<std::int8_t> values, std::vector<std::int32_t> biases)
+    : views_(views), values_(std::move(values)), biases_(std::move(biases)) {
+  const std::size_t lanes = groups() * group * WindowGrid::positions;
+  if (values_.size() != lanes * dims || biases_.size() != lanes) {
+    throw std::invalid_argument("the windows of " + std::to_string(views) + " views take " +
+                                std::to_string(lanes * dims) + " bytes and " + std::to_string(lanes) +
+                                " biases, not " + std::to_string(values_.size()) + " and " +
+                                std::to_string(biases_.size()));
+  }
+}
+
+void WindowStore::best_scores(const QueryWindow& query, int row, int column,
+                              const PositionTolerance& tolerance, const WindowScale& scale,
+                              std::int32_t* scores) const {
+  const int reach = tolerance.cells;
+  const std::size_t lanes = groups() * group;
+  std::fill_n(scores, lanes, -no_view);
+  for (int r = std::max(row - reach, 0); r <= std::min(row + reach, WindowGrid::side - 1); ++r) {
+    for (int c = std::max(column - reach, 0); c <= std::min(column + reach, WindowGrid::side - 1); ++c) {
+      const auto squared = static_cast<float>((r - row) * (r - row) + (c - column) * (c - column));
+      const auto penalty =
+          static_cast<std::int32_t>(std::lround(0.5F * tolerance.penalty * squared / scale.product()));
+      const auto p = static_cast<std::size_t>(r * WindowGrid::side + c);
+      raise_scores(values_.data() + p * groups() * block_bytes, biases_.data() + p * lanes, groups(),
+                   query.values.data(), penalty, scores);
+    }
+  }
+}
+
+}  // namespace eigenpose
