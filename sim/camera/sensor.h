@@ -12,7 +12,7 @@ namespace eigenpose::sim {
 
 struct SensorOptions {
   double full_well = 12000.0;  ///< electrons at saturation
-  double read_noise = 9.0;     ///< electrons, standard deviation
+  double read_noise = 4.0;     ///< electrons, standard deviation
   double blur_sigma = 0.55;    ///< lens, pixels
   double vignetting = 0.07;    ///< light lost in the corners, 0…1
   bool color = true;           ///< false: one grey band

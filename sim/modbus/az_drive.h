@@ -30,8 +30,8 @@ struct DriveOptions {
   LabAxis axis = LabAxis::table;  ///< what the motor turns
   double steps_per_degree = 100.0;
   double home_deg = 0.0;            ///< where the axis stands when the drive counts 0
-  std::optional<double> lower_deg;  ///< software limits of the axis, none for a turntable
-  std::optional<double> upper_deg;
+  std::optional<double> lower_deg{};  ///< software limits of the axis, none for a turntable
+  std::optional<double> upper_deg{};
   bool homed = false;                 ///< at power on
   double homing_speed = 6000.0;       ///< steps/s
   double jog_speed = 2000.0;          ///< steps/s, of FW-POS and RV-POS

@@ -7,14 +7,8 @@ namespace eigenpose::sim {
 namespace {
 
 constexpr float gradient_step = 0.12F;  // mm: smaller than every rounding, far above float's resolution
-
-Vec3 gradient(const Shape& shape, Vec3 p) {
-  // Four points of a tetrahedron give the gradient with four evaluations.
-  constexpr std::array<Vec3, 4> corners{{{1, -1, -1}, {-1, -1, 1}, {-1, 1, -1}, {1, 1, 1}}};
-  Vec3 sum;
-  for (const Vec3 corner : corners) sum += shape.field(p + gradient_step * corner).distance * corner;
-  return (0.25F / gradient_step) * sum;
-}
+/// Keeps the vertex of a nearly flat cell from sliding along its surface. Relative to one crossing's weight.
+constexpr float regularization = 0.08F;
 
 /// The grid of distances around a shape.
 struct Grid {
@@ -31,6 +25,7 @@ struct Grid {
   [[nodiscard]] Vec3 point(int x, int y, int z) const {
     return origin + cell * Vec3{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
   }
+  [[nodiscard]] bool inside(int x, int y, int z) const { return values[index(x, y, z)] < 0.0F; }
 };
 
 Grid sampled(const Shape& shape) {
@@ -57,29 +52,123 @@ Grid sampled(const Shape& shape) {
   return grid;
 }
 
-/// The mean of the points where the cell's edges cross zero.
-bool crossing_mean(const Grid& grid, int x, int y, int z, Vec3& mean) {
-  constexpr std::array<std::array<int, 2>, 12> edges{
-      {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
-  std::array<float, 8> corner{};
-  int inside = 0;
-  for (int i = 0; i < 8; ++i) {
-    corner[static_cast<std::size_t>(i)] =
-        grid.values[grid.index(x + (i & 1), y + ((i >> 1) & 1), z + (i >> 2))];
-    if (corner[static_cast<std::size_t>(i)] < 0.0F) ++inside;
+/// Where an edge of the grid meets the surface.
+struct Crossing {
+  Vec3 point;
+  Vec3 normal;
+};
+
+/// All crossings; `number[axis][i]` is the crossing on the edge from grid point i along the axis, or −1.
+struct Crossings {
+  std::array<std::vector<int>, 3> number;
+  std::vector<Crossing> all;
+};
+
+Crossing crossing_near(const Shape& shape, Vec3 p) {
+  // Four points of a tetrahedron give the gradient with four evaluations, and their mean the distance.
+  constexpr std::array<Vec3, 4> corners{{{1, -1, -1}, {-1, -1, 1}, {-1, 1, -1}, {1, 1, 1}}};
+  Vec3 gradient;
+  float distance = 0.0F;
+  for (const Vec3 corner : corners) {
+    const float d = shape.field(p + gradient_step * corner).distance;
+    gradient += d * corner;
+    distance += 0.25F * d;
   }
-  if (inside == 0 || inside == 8) return false;
-  Vec3 sum;
-  float count = 0.0F;
-  for (const auto& edge : edges) {
-    const float a = corner[static_cast<std::size_t>(edge[0])];
-    const float b = corner[static_cast<std::size_t>(edge[1])];
-    if ((a < 0.0F) == (b < 0.0F)) continue;
-    const auto place = [&](int i) { return grid.point(x + (i & 1), y + ((i >> 1) & 1), z + (i >> 2)); };
-    sum += mix(place(edge[0]), place(edge[1]), a / (a - b));
-    count += 1.0F;
+  gradient = (0.25F / gradient_step) * gradient;
+  const float squared = std::max(dot(gradient, gradient), 0.05F);
+  const float step = std::clamp(distance / squared, -0.3F * shape.cell, 0.3F * shape.cell);
+  return {p - step * gradient, normalized(gradient)};
+}
+
+Crossings crossings_of(const Shape& shape, const Grid& grid) {
+  Crossings result;
+  for (auto& numbers : result.number) numbers.assign(grid.values.size(), -1);
+  constexpr std::array<std::array<int, 3>, 3> step{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  for (int z = 0; z + 1 < grid.nz; ++z) {
+    for (int y = 0; y + 1 < grid.ny; ++y) {
+      for (int x = 0; x + 1 < grid.nx; ++x) {
+        const float a = grid.values[grid.index(x, y, z)];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const int x1 = x + step[axis][0];
+          const int y1 = y + step[axis][1];
+          const int z1 = z + step[axis][2];
+          const float b = grid.values[grid.index(x1, y1, z1)];
+          if ((a < 0.0F) == (b < 0.0F)) continue;
+          result.number[axis][grid.index(x, y, z)] = static_cast<int>(result.all.size());
+          result.all.push_back(
+              crossing_near(shape, mix(grid.point(x, y, z), grid.point(x1, y1, z1), a / (a - b))));
+        }
+      }
+    }
   }
-  mean = (1.0F / count) * sum;
+  return result;
+}
+
+/// The edges of a cell: axis, and offset of the grid point they start from.
+constexpr std::array<std::array<int, 4>, 12> cell_edges{{{0, 0, 0, 0},
+                                                         {0, 0, 1, 0},
+                                                         {0, 0, 0, 1},
+                                                         {0, 0, 1, 1},
+                                                         {1, 0, 0, 0},
+                                                         {1, 1, 0, 0},
+                                                         {1, 0, 0, 1},
+                                                         {1, 1, 0, 1},
+                                                         {2, 0, 0, 0},
+                                                         {2, 1, 0, 0},
+                                                         {2, 0, 1, 0},
+                                                         {2, 1, 1, 0}}};
+
+/// Solves a symmetric system of three equations. @param m its xx, xy, xz, yy, yz, zz.
+Vec3 solved(const std::array<float, 6>& m, Vec3 right) {
+  const Vec3 c0{m[0], m[1], m[2]};
+  const Vec3 c1{m[1], m[3], m[4]};
+  const Vec3 c2{m[2], m[4], m[5]};
+  const Vec3 u = cross(c1, c2);
+  const float determinant = dot(c0, u);
+  return (1.0F / determinant) * Vec3{dot(right, u), dot(right, cross(c2, c0)), dot(right, cross(c0, c1))};
+}
+
+/// Adds the cell's vertex where the planes through its crossings meet best (dual contouring: Ju et al. 2002),
+/// so that edges of the shape stay sharp.
+bool add_vertex(const Shape& shape, const Grid& grid, const Crossings& crossings, int x, int y, int z,
+                Mesh& mesh) {
+  std::array<const Crossing*, 12> found{};
+  std::size_t count = 0;
+  Vec3 mean;
+  Vec3 normal;
+  for (const auto& edge : cell_edges) {
+    const int number =
+        crossings
+            .number[static_cast<std::size_t>(edge[0])][grid.index(x + edge[1], y + edge[2], z + edge[3])];
+    if (number < 0) continue;
+    const Crossing& crossing = crossings.all[static_cast<std::size_t>(number)];
+    found[count++] = &crossing;
+    mean += crossing.point;
+    normal += crossing.normal;
+  }
+  if (count == 0) return false;
+  mean = (1.0F / static_cast<float>(count)) * mean;
+  std::array<float, 6> m{regularization, 0.0F, 0.0F, regularization, 0.0F, regularization};
+  Vec3 right;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 n = found[i]->normal;
+    const float offset = dot(n, found[i]->point - mean);
+    m[0] += n.x * n.x;
+    m[1] += n.x * n.y;
+    m[2] += n.x * n.z;
+    m[3] += n.y * n.y;
+    m[4] += n.y * n.z;
+    m[5] += n.z * n.z;
+    right += offset * n;
+  }
+  const Vec3 move = solved(m, right);
+  const Vec3 low = grid.point(x, y, z) - (0.1F * grid.cell) * Vec3{1, 1, 1};
+  const Vec3 high = grid.point(x + 1, y + 1, z + 1) + (0.1F * grid.cell) * Vec3{1, 1, 1};
+  const Vec3 p{std::clamp(mean.x + move.x, low.x, high.x), std::clamp(mean.y + move.y, low.y, high.y),
+               std::clamp(mean.z + move.z, low.z, high.z)};
+  mesh.positions.push_back(p);
+  mesh.normals.push_back(normalized(normal));
+  mesh.parts.push_back(shape.field(p).part);
   return true;
 }
 
@@ -92,24 +181,14 @@ void add_quad(Mesh& mesh, std::array<std::uint32_t, 4> corner, bool flip) {
 
 Mesh mesh_of(const Shape& shape) {
   const Grid grid = sampled(shape);
+  const Crossings crossings = crossings_of(shape, grid);
   Mesh mesh;
   std::vector<std::uint32_t> vertex(grid.values.size(), 0);
   for (int z = 0; z + 1 < grid.nz; ++z) {
     for (int y = 0; y + 1 < grid.ny; ++y) {
       for (int x = 0; x + 1 < grid.nx; ++x) {
-        Vec3 p;
-        if (!crossing_mean(grid, x, y, z, p)) continue;
-        Vec3 normal;
-        for (int round = 0; round < 3; ++round) {
-          normal = gradient(shape, p);
-          const float squared = std::max(dot(normal, normal), 0.05F);
-          const float step = std::clamp(shape.field(p).distance / squared, -grid.cell, grid.cell);
-          p = p - step * normal;
-        }
-        vertex[grid.index(x, y, z)] = static_cast<std::uint32_t>(mesh.positions.size());
-        mesh.positions.push_back(p);
-        mesh.normals.push_back(normalized(gradient(shape, p)));
-        mesh.parts.push_back(shape.field(p).part);
+        const auto number = static_cast<std::uint32_t>(mesh.positions.size());
+        if (add_vertex(shape, grid, crossings, x, y, z, mesh)) vertex[grid.index(x, y, z)] = number;
       }
     }
   }
@@ -119,15 +198,15 @@ Mesh mesh_of(const Shape& shape) {
   for (int z = 1; z + 1 < grid.nz; ++z) {
     for (int y = 1; y + 1 < grid.ny; ++y) {
       for (int x = 1; x + 1 < grid.nx; ++x) {
-        const bool inside = grid.values[grid.index(x, y, z)] < 0.0F;
+        const bool inside = grid.inside(x, y, z);
         const auto at = [&](int dx, int dy, int dz) { return vertex[grid.index(x - dx, y - dy, z - dz)]; };
-        if (inside != (grid.values[grid.index(x + 1, y, z)] < 0.0F)) {
+        if (inside != grid.inside(x + 1, y, z)) {
           add_quad(mesh, {at(0, 1, 1), at(0, 0, 1), at(0, 0, 0), at(0, 1, 0)}, !inside);
         }
-        if (inside != (grid.values[grid.index(x, y + 1, z)] < 0.0F)) {
+        if (inside != grid.inside(x, y + 1, z)) {
           add_quad(mesh, {at(1, 0, 1), at(1, 0, 0), at(0, 0, 0), at(0, 0, 1)}, !inside);
         }
-        if (inside != (grid.values[grid.index(x, y, z + 1)] < 0.0F)) {
+        if (inside != grid.inside(x, y, z + 1)) {
           add_quad(mesh, {at(1, 1, 0), at(0, 1, 0), at(0, 0, 0), at(1, 0, 0)}, !inside);
         }
       }

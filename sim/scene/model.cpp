@@ -1,5 +1,6 @@
 #include "sim/scene/model.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -15,7 +16,7 @@
 namespace eigenpose::sim {
 namespace {
 
-constexpr int openness_rays = 32;
+constexpr int openness_rays = 24;
 constexpr float openness_reach_mm = 90.0F;
 
 /// Directions around +z with a density like the cosine, evenly spread.
@@ -83,12 +84,29 @@ Model::Model(const Shape& shape) : shape_(shape), mesh_(mesh_of(shape)) {
   }
   center_ = 0.5F * (lower + upper);
   for (const Vec3 p : mesh_.positions) radius_ = std::max(radius_, length(p - center_));
+  find_outline();
   measure_openness();
 }
 
 Model::~Model() {
   if (scene_ != nullptr) rtcReleaseScene(scene_);
   if (device_ != nullptr) rtcReleaseDevice(device_);
+}
+
+// The vertices that go farthest in directions spread evenly over the sphere.
+void Model::find_outline() {
+  constexpr int directions = 160;
+  for (int i = 0; i < directions; ++i) {
+    const float z = 1.0F - (2.0F * static_cast<float>(i) + 1.0F) / directions;
+    const float r = std::sqrt(1.0F - z * z);
+    const float angle = static_cast<float>(i) * 2.399963F;  // golden angle
+    const Vec3 direction{r * std::cos(angle), r * std::sin(angle), z};
+    const auto farthest =
+        std::max_element(mesh_.positions.begin(), mesh_.positions.end(),
+                         [&](Vec3 a, Vec3 b) { return dot(a, direction) < dot(b, direction); });
+    if (std::find(outline_.begin(), outline_.end(), *farthest) == outline_.end())
+      outline_.push_back(*farthest);
+  }
 }
 
 // The table below is an occluder too: the part of the hemisphere that looks down counts as closed.

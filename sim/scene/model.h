@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "sim/scene/mesh.h"
 
@@ -23,17 +24,22 @@ class Model {
   [[nodiscard]] const Shape& shape() const { return shape_; }
   [[nodiscard]] const Mesh& mesh() const { return mesh_; }
   [[nodiscard]] RTCSceneTy* scene() const { return scene_; }
+  /// Vertices on the outside, enough to say where the whole is seen from anywhere, to a fraction of a
+  /// millimetre.
+  [[nodiscard]] const std::vector<Vec3>& outline() const { return outline_; }
   /// A sphere around everything.
   [[nodiscard]] Vec3 center() const { return center_; }
   [[nodiscard]] float radius() const { return radius_; }
 
  private:
   void measure_openness();
+  void find_outline();
 
   Shape shape_;
   Mesh mesh_;
   RTCDeviceTy* device_ = nullptr;
   RTCSceneTy* scene_ = nullptr;
+  std::vector<Vec3> outline_;
   Vec3 center_;
   float radius_ = 0.0F;
 };

@@ -162,10 +162,10 @@ Shape block_b() {
   return {block_field, block_b_paint, {-30, -30, 0}, {30, 30, 60}, 1.6F};
 }
 Shape house() {
-  return {house_field, house_paint, {-41, -38, 0}, {41, 35, 83}, 1.2F};
+  return {house_field, house_paint, {-41, -38, 0}, {41, 35, 83}, 1.6F};
 }
 Shape shoe() {
-  return {shoe_field, shoe_paint, {-60, -25, 0}, {47, 25, 76}, 1.4F};
+  return {shoe_field, shoe_paint, {-60, -25, 0}, {47, 25, 76}, 1.6F};
 }
 
 }  // namespace eigenpose::sim::objects

@@ -119,13 +119,13 @@ Paint teapot_paint(Vec3 p, Vec3, int part) {
 }  // namespace
 
 Shape mug_red() {
-  return {mug_field, mug_red_paint, {-36, -36, 0}, {63, 36, 86}, 1.4F};
+  return {mug_field, mug_red_paint, {-36, -36, 0}, {63, 36, 86}, 1.6F};
 }
 Shape mug_blue() {
-  return {mug_field, mug_blue_paint, {-36, -36, 0}, {63, 36, 86}, 1.4F};
+  return {mug_field, mug_blue_paint, {-36, -36, 0}, {63, 36, 86}, 1.6F};
 }
 Shape bottle() {
-  return {bottle_field, bottle_paint, {-26, -26, 0}, {26, 26, 107}, 0.9F};
+  return {bottle_field, bottle_paint, {-26, -26, 0}, {26, 26, 107}, 1.3F};
 }
 Shape teapot() {
   return {teapot_field, teapot_paint, {-66, -39, 0}, {61, 39, 76}, 1.5F};

@@ -7,12 +7,11 @@
 /// surfaces mirror of it. On request one bounce of light between surfaces. Edges are cast four times.
 
 #include <memory>
-#include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "sim/lab/scene_state.h"
-#include "sim/scene/model.h"
+#include "sim/scene/tracer.h"
 
 namespace eigenpose::sim {
 
@@ -38,12 +37,14 @@ class Renderer {
   [[nodiscard]] cv::Mat render(const SceneState& scene);
 
  private:
-  struct Setting;
-  [[nodiscard]] const cv::Mat& empty_stage(const Setting& setting);
+  struct Stage;
+  struct Canvas;
+  void light_stage(const Light& light);
 
   RenderOptions options_;
-  cv::Mat empty_;                         ///< the picture without objects, kept as long as the light stands
-  std::unique_ptr<Setting> empty_light_;  ///< the light of `empty_`
+  Pinhole camera_;
+  std::unique_ptr<Stage> stage_;    ///< the picture without objects, kept as long as the light stands
+  std::unique_ptr<Canvas> canvas_;  ///< room to draw in
 };
 
 }  // namespace eigenpose::sim

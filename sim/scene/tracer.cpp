@@ -17,7 +17,7 @@ constexpr float lamp_strength = 1.12F;     // puts a white sheet on the table ne
 constexpr float clear_of_surface = 0.25F;  // mm a shadow ray starts above its surface
 constexpr Vec3 felt{0.0042F, 0.0042F, 0.0046F};
 constexpr Vec3 backdrop{0.0030F, 0.0030F, 0.0032F};
-constexpr Vec3 rim{0.011F, 0.011F, 0.012F};
+constexpr Vec3 rim{0.0068F, 0.0068F, 0.0072F};
 
 float radians_of(float degrees_value) {
   return degrees_value * pi / 180.0F;
@@ -68,22 +68,25 @@ float Pinhole::pixels_per_mm(Vec3 point) const {
   return focal_ / std::max(dot(point - position_, forward_), 1.0F);
 }
 
+Body::Body(std::shared_ptr<const Model> what, float angle, Vec3 where)
+    : model(std::move(what)), cosine(std::cos(angle)), sine(std::sin(angle)), offset(where) {
+  middle = direction_to_world(model->center()) + offset;
+}
+
 std::vector<Body> bodies_of(const SceneState& scene) {
   std::vector<Body> bodies;
   for (const PosedObject& object : scene.objects) {
     auto model = model_of(object.name);
     if (!model) continue;
     const float angle = radians_of(static_cast<float>(object.angle_deg));
-    bodies.push_back({std::move(model),
-                      std::cos(angle),
-                      std::sin(angle),
-                      {static_cast<float>(object.x_mm), static_cast<float>(object.y_mm),
-                       static_cast<float>(object.z_mm)}});
+    bodies.emplace_back(std::move(model), angle,
+                        Vec3{static_cast<float>(object.x_mm), static_cast<float>(object.y_mm),
+                             static_cast<float>(object.z_mm)});
   }
   if (scene.hand) {
     const Vec3 offset = stage::hand_offset(static_cast<float>(*scene.hand)) + stage::hand_rest;
     const float angle = radians_of(stage::hand_angle_deg);
-    bodies.push_back({hand_model(), std::cos(angle), std::sin(angle), offset});
+    bodies.emplace_back(hand_model(), angle, offset);
   }
   return bodies;
 }
@@ -104,7 +107,8 @@ struct Tracer::Hit {
 Tracer::Tracer(const Pinhole& camera, Light light, std::vector<Body> bodies, int bounce_rays)
     : camera_(camera), light_(light), bodies_(std::move(bodies)), bounce_rays_(bounce_rays) {
   // Four points of the lamp's disc, each standing for a quarter of its area.
-  const Vec3 axis = normalized(stage::lamp_aim - light_.position);
+  lamp_axis_ = normalized(stage::lamp_aim - light_.position);
+  const Vec3 axis = lamp_axis_;
   const Vec3 side = normalized(cross(axis, std::abs(axis.z) < 0.95F ? Vec3{0, 0, 1} : Vec3{1, 0, 0}));
   const Vec3 other = cross(axis, side);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -118,7 +122,7 @@ void Tracer::intersect(const Rays& rays, std::array<Hit, 4>& hits) const {
   alignas(16) const std::array<int, 4> valid{-1, -1, -1, -1};
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const Body& body = bodies_[b];
-    const Vec3 center = body.center();
+    const Vec3 center = body.middle;
     bool near = false;
     for (std::size_t k = 0; k < 4 && !near; ++k) {
       near = passes(rays.origin[k], rays.direction[k], 1e5F, center, body.model->radius());
@@ -153,8 +157,7 @@ void Tracer::intersect(const Rays& rays, std::array<Hit, 4>& hits) const {
 Vec3 Tracer::lamp_irradiance(Vec3 point) const {
   const Vec3 d = point - light_.position;
   const float squared = dot(d, d);
-  const Vec3 axis = normalized(stage::lamp_aim - light_.position);
-  const float cosine = dot(d, axis) / std::sqrt(squared);
+  const float cosine = dot(d, lamp_axis_) / std::sqrt(squared);
   const float beam = smooth_step(0.80F, 0.95F, cosine);
   const float strength =
       light_.level * lamp_strength * beam * stage::lamp_distance_mm * stage::lamp_distance_mm / squared;
@@ -168,8 +171,7 @@ float Tracer::lamp_visible(Vec3 point) const {
   const Vec3 direction = (1.0F / reach) * way;
   for (const Body& body : bodies_) {
     // The lamp's points lie off the middle ray by at most its radius.
-    if (!passes(point, direction, reach, body.center(), body.model->radius() + stage::lamp_radius_mm))
-      continue;
+    if (!passes(point, direction, reach, body.middle, body.model->radius() + stage::lamp_radius_mm)) continue;
     alignas(16) RTCRay4 packet{};
     const Vec3 o = body.to_local(point);
     for (std::size_t k = 0; k < 4; ++k) {
@@ -196,42 +198,42 @@ float Tracer::lamp_visible(Vec3 point) const {
   return 0.25F * static_cast<float>(open);
 }
 
-Vec3 Tracer::stage_colour(Vec3 direction, bool shadowed) const {
-  const Vec3 origin = camera_.position();
-  Vec3 point = origin + (-origin.z / direction.z) * direction;
-  Vec3 normal{0.0F, 0.0F, 1.0F};
-  Vec3 albedo = felt;
-  const float edge = static_cast<float>(stage::table_radius_mm);
-  float r = std::hypot(point.x, point.y);
-  if (r > edge) {
-    // The table's side, or past it the backdrop below.
-    const float a = direction.x * direction.x + direction.y * direction.y;
-    const float b = origin.x * direction.x + origin.y * direction.y;
-    const float c = origin.x * origin.x + origin.y * origin.y - edge * edge;
-    const float discriminant = b * b - a * c;
-    const float t = discriminant > 0.0F ? (-b - std::sqrt(discriminant)) / a : -1.0F;
-    const Vec3 side = origin + t * direction;
-    if (discriminant > 0.0F && side.z <= 0.0F && side.z >= -stage::table_height_mm) {
-      point = side;
-      normal = normalized({side.x, side.y, 0.0F});
-      albedo = rim;
-    } else {
-      point = origin + ((-stage::table_height_mm - origin.z) / direction.z) * direction;
-      albedo = backdrop;
-    }
-  } else if (r > edge - 2.5F) {
-    albedo = rim;
-  } else if (std::abs(std::remainder(r, 25.0F)) < 0.35F && r > 12.0F) {
-    albedo = 1.35F * felt;  // fine rings for centring an object
+StagePoint stage_point(Vec3 camera, Vec3 direction) {
+  const auto at = [&](float t) { return camera + t * direction; };
+  const auto edge = static_cast<float>(stage::table_radius_mm);
+  const Vec3 top = at(-camera.z / direction.z);
+  const float r = std::sqrt(top.x * top.x + top.y * top.y);
+  const Vec3 up{0.0F, 0.0F, 1.0F};
+  if (r <= edge) {
+    if (r > edge - 2.5F) return {top, up, rim};
+    // Fine rings help to centre an object.
+    const bool ring = std::abs(std::remainder(r, 25.0F)) < 0.35F && r > 12.0F;
+    return {top, up, ring ? 1.35F * felt : felt};
   }
-  const Vec3 to_light = normalized(light_.position - point);
-  const float nl = dot(normal, to_light);
-  Vec3 light = room_irradiance(normal);
-  if (nl > 0.0F) {
-    const float visible = shadowed ? lamp_visible(point + clear_of_surface * normal) : 1.0F;
-    if (visible > 0.0F) light += (nl * visible) * lamp_irradiance(point);
+  // The table's side, or past it the backdrop below.
+  const float a = direction.x * direction.x + direction.y * direction.y;
+  const float b = camera.x * direction.x + camera.y * direction.y;
+  const float c = camera.x * camera.x + camera.y * camera.y - edge * edge;
+  const float discriminant = b * b - a * c;
+  if (discriminant > 0.0F) {
+    const Vec3 side = at((-b - std::sqrt(discriminant)) / a);
+    if (side.z <= 0.0F && side.z >= -stage::table_height_mm)
+      return {side, normalized({side.x, side.y, 0.0F}), rim};
   }
-  return albedo * light;
+  return {at((-stage::table_height_mm - camera.z) / direction.z), up, backdrop};
+}
+
+float Tracer::lit(const StagePoint& place) const {
+  return lamp_visible(place.point + clear_of_surface * place.normal);
+}
+
+Vec3 Tracer::stage_in_room(const StagePoint& place) const {
+  return place.albedo * room_irradiance(place.normal);
+}
+
+Vec3 Tracer::stage_in_lamp(const StagePoint& place) const {
+  const float nl = dot(place.normal, normalized(light_.position - place.point));
+  return std::max(nl, 0.0F) * (place.albedo * lamp_irradiance(place.point));
 }
 
 Sample Tracer::shade(const Hit& hit, Vec3 origin, Vec3 direction, bool with_bounce) const {
@@ -304,8 +306,7 @@ std::array<Sample, 4> Tracer::sample(const std::array<Vec3, 4>& directions) cons
   intersect(rays, hits);
   std::array<Sample, 4> samples;
   for (std::size_t k = 0; k < 4; ++k) {
-    samples[k] = hits[k].body >= 0 ? shade(hits[k], rays.origin[k], directions[k], bounce_rays_ > 0)
-                                   : Sample{stage_colour(directions[k], true), -1};
+    if (hits[k].body >= 0) samples[k] = shade(hits[k], rays.origin[k], directions[k], bounce_rays_ > 0);
   }
   return samples;
 }

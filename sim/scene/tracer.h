@@ -44,10 +44,13 @@ class Pinhole {
 
 /// A model at its place.
 struct Body {
+  Body(std::shared_ptr<const Model> what, float angle, Vec3 where);
+
   std::shared_ptr<const Model> model;
-  float cosine = 1.0F;
-  float sine = 0.0F;
+  float cosine;
+  float sine;
   Vec3 offset;
+  Vec3 middle;  ///< of the sphere around it, in the world
 
   [[nodiscard]] Vec3 to_local(Vec3 point) const { return direction_to_local(point - offset); }
   [[nodiscard]] Vec3 direction_to_local(Vec3 d) const {
@@ -56,7 +59,6 @@ struct Body {
   [[nodiscard]] Vec3 direction_to_world(Vec3 d) const {
     return {cosine * d.x - sine * d.y, sine * d.x + cosine * d.y, d.z};
   }
-  [[nodiscard]] Vec3 center() const { return direction_to_world(model->center()) + offset; }
 };
 /// The bodies of a scene, the hand last. Objects without a model are left out.
 std::vector<Body> bodies_of(const SceneState& scene);
@@ -64,8 +66,17 @@ std::vector<Body> bodies_of(const SceneState& scene);
 /// What one ray found.
 struct Sample {
   Vec3 colour;
-  int what = -1;  ///< body and part as one number; −1: only table or backdrop
+  int what = -1;  ///< body and part as one number; −1: no body, then there is no colour either
 };
+
+/// A point of the table, its side, or the backdrop.
+struct StagePoint {
+  Vec3 point;
+  Vec3 normal;
+  Vec3 albedo;
+};
+/// What a ray from the camera meets when nothing stands in its way.
+StagePoint stage_point(Vec3 camera, Vec3 direction);
 
 /// Immutable while it lives; any thread may sample.
 class Tracer {
@@ -74,8 +85,11 @@ class Tracer {
 
   /// Four rays from the camera at once; near ones are cheaper.
   [[nodiscard]] std::array<Sample, 4> sample(const std::array<Vec3, 4>& directions) const;
-  /// Table or backdrop, ignoring bodies except for their shadow.
-  [[nodiscard]] Vec3 stage_colour(Vec3 direction, bool shadowed) const;
+  /// How much of the lamp a point of the stage sees past the bodies, 0…1.
+  [[nodiscard]] float lit(const StagePoint& place) const;
+  /// What the room alone, and the lamp alone if nothing shadows it, make a point of the stage look like.
+  [[nodiscard]] Vec3 stage_in_room(const StagePoint& place) const;
+  [[nodiscard]] Vec3 stage_in_lamp(const StagePoint& place) const;
   [[nodiscard]] const std::vector<Body>& bodies() const { return bodies_; }
 
  private:
@@ -91,6 +105,7 @@ class Tracer {
   Light light_;
   std::vector<Body> bodies_;
   int bounce_rays_;
+  Vec3 lamp_axis_;
   std::array<Vec3, 4> lamp_points_;
 };
 

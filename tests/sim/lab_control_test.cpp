@@ -16,7 +16,8 @@ namespace {
 using testing::HasSubstr;
 
 struct Folder {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / ("eigenpose-lab-" + std::to_string(::getpid()));
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("eigenpose-lab-" + std::to_string(::getpid()));
   Folder() { std::filesystem::create_directories(path); }
   ~Folder() { std::filesystem::remove_all(path); }
 };
@@ -69,8 +70,9 @@ TEST_F(LabControl, SaysWhyItRefuses) {
 }
 
 TEST_F(LabControl, BadLinesGetAnAnswerAndChangeNothing) {
-  for (const char* line : {"", "{", "[]", "3", "{\"do\": 5}", "{\"do\": \"place\"}", "{\"do\": \"place\", \"object\": 4}",
-                           "{\"do\": \"lamp\", \"level\": 7}", "{\"do\": \"remove\", \"id\": -1}", "{\"do\": \"fly\"}"}) {
+  for (const char* line :
+       {"", "{", "[]", "3", "{\"do\": 5}", "{\"do\": \"place\"}", "{\"do\": \"place\", \"object\": 4}",
+        "{\"do\": \"lamp\", \"level\": 7}", "{\"do\": \"remove\", \"id\": -1}", "{\"do\": \"fly\"}"}) {
     EXPECT_THAT(obey_lab_request(lab, nullptr, line), HasSubstr("\"ok\":false")) << line;
   }
   EXPECT_TRUE(lab.truth().objects.empty());

@@ -44,7 +44,8 @@ TEST_F(Lab, TheTableTurnsWhatStandsOnIt) {
 }
 
 TEST_F(Lab, TheTruthFollowsTheMotionLaw) {
-  const auto motion = Trajectory::standstill(0.0, clock.now()).move_to(180.0, {90.0, 360.0, 360.0}, clock.now());
+  const auto motion =
+      Trajectory::standstill(0.0, clock.now()).move_to(180.0, {90.0, 360.0, 360.0}, clock.now());
   lab.set_axis_motion(LabAxis::table, motion);
   while (!(clock.now() > motion.end())) {
     EXPECT_NEAR(lab.truth().table.degrees(), motion.position(clock.now()), 1e-9);

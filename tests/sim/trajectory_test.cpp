@@ -13,7 +13,9 @@ using std::chrono::milliseconds;
 
 constexpr TimePoint begin{std::chrono::seconds(100)};
 
-double seconds(Duration time) { return duration<double>(time).count(); }
+double seconds(Duration time) {
+  return duration<double>(time).count();
+}
 
 TEST(Trajectory, StandsBeforeItsStartAndAfterItsEnd) {
   const auto motion = Trajectory::standstill(10.0, begin).move_to(100.0, {90.0, 360.0, 360.0}, begin);
@@ -38,8 +40,8 @@ TEST(Trajectory, TakesTheTimeOfATriangleWhenTooShortForFullSpeed) {
   EXPECT_NEAR(seconds(motion.end() - begin), peak / 360.0 + peak / 180.0, 1e-6);
 }
 
-/// Whatever is asked in the middle of whatever motion: position and speed have no jumps, speed and acceleration keep to
-/// the limits, and the end is where it should be.
+/// Whatever is asked in the middle of whatever motion: position and speed have no jumps, speed and
+/// acceleration keep to the limits, and the end is where it should be.
 TEST(Trajectory, NeverJumpsWhenItIsCommandedAnewOnTheWay) {
   std::mt19937 generator(7);
   std::uniform_real_distribution<double> place(-200.0, 200.0);
