@@ -15,6 +15,7 @@
 
 #include "core/base/error.h"
 #include "daemon/cli/commands.h"
+#include "daemon/cli/hardware_commands.h"
 #include "daemon/cli/service_commands.h"
 
 namespace eigenpose::cli {
@@ -31,6 +32,11 @@ const std::vector<AddCommand> commands = {
     add_recognize_command,  //
     add_inspect_command,    //
     add_evaluate_command,   //
+    add_doctor_command,     //
+    add_devices_command,    //
+    add_jog_command,        //
+    add_home_command,       //
+    add_lamp_command,       //
 };
 
 constexpr const char* about =

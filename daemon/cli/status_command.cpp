@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/cli/service_commands.h"
 #include "daemon/cli/service_client.h"
+#include "daemon/cli/service_commands.h"
 
 namespace eigenpose::cli {
 namespace {

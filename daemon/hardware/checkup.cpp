@@ -1,0 +1,311 @@
+#include "daemon/hardware/checkup.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+#include <grp.h>
+#include <pwd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "core/base/error.h"
+
+namespace eigenpose {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::seconds;
+
+Machine present(Machine machine) {
+  if (!machine.user.empty()) return machine;
+  const struct passwd* user = getpwuid(geteuid());
+  machine.user = user == nullptr ? std::to_string(geteuid()) : user->pw_name;
+  machine.is_root = geteuid() == 0;
+  if (machine.groups.empty()) {
+    std::vector<gid_t> ids(256);
+    const int count = getgroups(static_cast<int>(ids.size()), ids.data());
+    for (int i = 0; i < count; ++i) {
+      const struct group* group = getgrgid(ids[static_cast<std::size_t>(i)]);
+      if (group != nullptr) machine.groups.emplace_back(group->gr_name);
+    }
+  }
+  return machine;
+}
+
+bool is_member(const Machine& machine, const std::string& group) {
+  return machine.is_root ||
+         std::find(machine.groups.begin(), machine.groups.end(), group) != machine.groups.end();
+}
+
+void check_folder(const fs::path& folder, const char* key, const Report& report) {
+  std::error_code failed;
+  if (fs::is_directory(folder, failed)) {
+    if (access(folder.c_str(), W_OK | X_OK) == 0) {
+      report({Health::good, key, folder.string() + " can be written", {}});
+    } else {
+      report({Health::note, key, folder.string() + " cannot be written by this user",
+              "the service's user needs it, you do not; to run eigenposed by hand give --runtime-dir and "
+              "--state-dir"});
+    }
+    return;
+  }
+  fs::path above = folder;
+  while (!above.empty() && above != "/" && !fs::exists(above, failed)) above = above.parent_path();
+  if (access(above.c_str(), W_OK) == 0) {
+    report({Health::good, key, folder.string() + " will be made at the start", {}});
+  } else {
+    report(
+        {Health::note, key, folder.string() + " is not there and this user cannot make it",
+         "systemd makes it for the service; to run eigenposed by hand give --runtime-dir and --state-dir"});
+  }
+}
+
+void check_rules(const Machine& machine, const Report& report) {
+  for (const char* folder : {"etc/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d"}) {
+    const fs::path rules = machine.root / folder / "60-eigenpose.rules";
+    std::error_code failed;
+    if (fs::exists(rules, failed)) {
+      report({Health::good, "udev rules", rules.string() + " is installed", {}});
+      return;
+    }
+  }
+  report({Health::fault, "udev rules",
+          "60-eigenpose.rules is not installed, so USB devices belong to root alone",
+          "cp systemd/60-eigenpose.rules /etc/udev/rules.d/ && udevadm control --reload && udevadm trigger"});
+}
+
+void check_node(const Machine& machine, const std::string& subject, const fs::path& node, bool accessible,
+                const Report& report) {
+  if (accessible) {
+    report({Health::good, subject, node.string() + " may be opened by " + machine.user, {}});
+    return;
+  }
+  const std::string group = group_of(node);
+  if (!group.empty() && group != "root" && !is_member(machine, group)) {
+    report(
+        {Health::fault, subject,
+         fmt::format("{} belongs to the group '{}', and {} is not in it", node.string(), group, machine.user),
+         fmt::format("adduser {} {}, then log in again", machine.user, group)});
+  } else {
+    report({Health::fault, subject, fmt::format("{} may not be opened by {}", node.string(), machine.user),
+            "install the udev rules (see there) and plug the device in again"});
+  }
+}
+
+/// "rtu:/dev/ttyUSB0:115200:8E1" → "/dev/ttyUSB0"; "usb:SERIAL" → "SERIAL"; otherwise nothing.
+std::optional<std::string> part_after(const std::string& endpoint, const std::string& scheme) {
+  if (!endpoint.starts_with(scheme)) return std::nullopt;
+  const std::size_t begin = scheme.size();
+  return endpoint.substr(begin, endpoint.find(':', begin) - begin);
+}
+
+void check_serial_port(const Machine& machine, const std::string& subject, const std::string& port,
+                       const Inventory& inventory, const Report& report) {
+  const fs::path node = machine.root / fs::path(port).relative_path();
+  std::error_code failed;
+  if (!fs::exists(node, failed)) {
+    std::string others;
+    for (const SerialPortFound& found : inventory.serial_ports) {
+      others += (others.empty() ? "" : ", ") + (found.by_id.empty() ? found.path : found.by_id);
+    }
+    report({Health::fault, subject, "there is no " + port,
+            others.empty() ? "plug in the serial adapter; no other is there"
+                           : "plug in the adapter, or set the endpoint to one that is there: " + others});
+    return;
+  }
+  check_node(machine, subject, node, is_accessible(node), report);
+  if (port.starts_with("/dev/ttyUSB") || port.starts_with("/dev/ttyACM")) {
+    for (const SerialPortFound& found : inventory.serial_ports) {
+      if (found.path != node.string() || found.by_id.empty()) continue;
+      report({Health::note, subject, port + " changes with the order of plugging in",
+              "set the endpoint to " + found.by_id});
+    }
+  }
+}
+
+void check_usb(const Machine& machine, const std::string& subject, const std::string& serial,
+               const Inventory& inventory, const Report& report) {
+  std::string others;
+  for (const UsbFound& usb : inventory.usb) {
+    if (usb.serial == serial) {
+      check_node(machine, subject, usb.node, usb.accessible, report);
+      return;
+    }
+    others += (others.empty() ? "" : ", ") + usb.serial + " (" + usb.name + ")";
+  }
+  report({Health::fault, subject, "no USB device with the serial number " + serial + " is plugged in",
+          others.empty()
+              ? "plug it in and switch it on; no FTDI device is there"
+              : "plug it in and switch it on, or set the endpoint to one that is there: " + others});
+}
+
+void check_camera_node(const Machine& machine, const CameraOptions& camera, const Inventory& inventory,
+                       const Report& report) {
+  if (camera.driver != "v4l2") return;
+  for (const CameraFound& found : inventory.cameras) {
+    const bool meant = (camera.serial.empty() || camera.serial == found.node.serial) &&
+                       (camera.device.empty() || camera.device == found.node.path) &&
+                       (camera.bus_path.empty() || camera.bus_path == found.node.port ||
+                        camera.bus_path == found.node.bus_info);
+    if (meant && found.node.open_error == EACCES) {
+      check_node(machine, "camera", found.node.path, false, report);
+      return;
+    }
+  }
+  if (camera.serial.empty() && camera.bus_path.empty()) {
+    report({Health::note, "camera", "the configuration names neither serial number nor bus path",
+            "set serial or bus_path in [camera], so that no other camera is ever taken for it; 'eigenpose "
+            "devices' lists them"});
+  }
+}
+
+/// What a picture tells of lens cap and exposure. Shares are of all pixels.
+void check_picture(const Frame& frame, const Report& report) {
+  const cv::Mat flat = frame.image.reshape(1);
+  const double full = flat.depth() == CV_16U ? 65535.0 : 255.0;
+  const double mean = cv::mean(flat)[0] / full;
+  const double saturated =
+      static_cast<double>(cv::countNonZero(flat >= full)) / static_cast<double>(flat.total());
+  if (mean < 0.004) {
+    report({Health::note, "picture", "it is black",
+            "take off the lens cap, switch on the lamp, or set a longer exposure"});
+  } else if (saturated > 0.05) {
+    report({Health::note, "picture", fmt::format("{:.0f} % of it is saturated", 100.0 * saturated),
+            "set a shorter exposure or less gain in [camera.controls]"});
+  } else {
+    report({Health::good,
+            "picture",
+            fmt::format("mean level {:.0f} %, {:.1f} % saturated", 100.0 * mean, 100.0 * saturated),
+            {}});
+  }
+}
+
+void check_camera(const Devices& devices, const Clock& clock, const std::stop_token& stop,
+                  const Report& report) {
+  const std::unique_ptr<Camera> camera = devices.camera();
+  const CameraInfo& info = camera->info();
+  report({Health::good,
+          "camera",
+          fmt::format("{} (serial {}): {} {}x{} at {:.3g} fps", info.model,
+                      info.serial.empty() ? "none" : info.serial, info.format, info.width, info.height,
+                      info.frames_per_second),
+          {}});
+  constexpr int frames = 10;
+  Frame frame;
+  for (int i = 0; i < frames; ++i) frame = camera->next_frame(clock.now() + seconds(5), stop);
+  const CameraStatistics counts = camera->statistics();
+  if (counts.frames_damaged > 0) {
+    report(
+        {Health::note, "camera",
+         fmt::format("{} of {} frames came damaged", counts.frames_damaged, frames + counts.frames_damaged),
+         "try another cable or USB port"});
+  }
+  check_picture(frame, report);
+}
+
+void check_axis(const RigAxis& axis, const Clock& clock, const Report& report) {
+  const std::string& name = axis.options.dof.name;
+  const std::unique_ptr<Axis> opened = axis.open();
+  const AxisState state = opened->state(clock.now() + seconds(3));
+  const std::string subject = "axis " + name;
+  if (state.alarm) {
+    report({Health::fault, subject, "the drive raises an alarm: " + *state.alarm,
+            "remove the cause, then 'eigenpose home " + name + "'"});
+    return;
+  }
+  report({Health::good,
+          subject,
+          fmt::format("{} answers: at {:.2f} {}{}", opened->info().model, state.position,
+                      axis.options.dof.unit, state.moving ? ", moving" : ""),
+          {}});
+  if (!state.homed) {
+    report({Health::note, subject, "it has not been homed, so its position means nothing yet",
+            "the service homes it before the first move; by hand: 'eigenpose home " + name + "'"});
+  }
+}
+
+void check_lamp(const RigLamp& lamp, const Clock& clock, const Report& report) {
+  const std::unique_ptr<Lamp> opened = lamp.open();
+  opened->set_level(0.0, clock.now() + seconds(3));
+  report({Health::good, "lamp " + lamp.options.name, opened->info().model + " answers", {}});
+}
+
+/// Runs one check; a failing device is a finding, not the end.
+template <class Check>
+void guarded(const std::string& subject, const std::stop_token& stop, const Report& report,
+             const Check& check) {
+  if (stop.stop_requested()) throw Interrupted();
+  try {
+    check();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const DeviceLost& lost) {
+    report({Health::fault, subject, lost.what(),
+            "see that it is plugged in, switched on, and named rightly in the configuration"});
+  } catch (const DeviceTimeout& timeout) {
+    report({Health::fault, subject, timeout.what(),
+            "see that it is switched on, and that address and line settings are the drive's"});
+  } catch (const std::exception& error) {
+    report({Health::fault, subject, error.what(),
+            "see that the configuration describes this device: endpoint, station, profile, controls"});
+  }
+}
+
+}  // namespace
+
+void check_machine(const Machine& given, const Config& config, const Inventory& inventory,
+                   const Report& report) {
+  const Machine machine = present(given);
+  check_folder(config.daemon.runtime_dir, "runtime_dir", report);
+  check_folder(config.daemon.state_dir, "state_dir", report);
+
+  bool needs_rules = false;
+  if (config.camera) check_camera_node(machine, *config.camera, inventory, report);
+  const auto check_endpoint = [&](const std::string& subject, const std::string& endpoint) {
+    if (const auto port = part_after(endpoint, "rtu:")) {
+      check_serial_port(machine, subject, *port, inventory, report);
+    } else if (const auto serial = part_after(endpoint, "usb:")) {
+      needs_rules = true;
+      check_usb(machine, subject, *serial, inventory, report);
+    }
+  };
+  for (const AxisOptions& axis : config.axes) check_endpoint("axis " + axis.dof.name, axis.endpoint);
+  for (const LampOptions& lamp : config.lamps) check_endpoint("lamp " + lamp.name, lamp.endpoint);
+  if (needs_rules) check_rules(machine, report);
+
+  std::error_code failed;
+  if (fs::exists(machine.root / "usr/sbin/ModemManager", failed) && !inventory.serial_ports.empty()) {
+    report({Health::note, "ModemManager",
+            "it talks to serial ports when they are plugged in, and may disturb a drive",
+            "install the udev rules, which keep it off, or: apt-get remove modemmanager"});
+  }
+}
+
+void check_devices(const Devices& devices, const Clock& clock, const std::stop_token& stop,
+                   const Report& report) {
+  if (devices.camera) guarded("camera", stop, report, [&] { check_camera(devices, clock, stop, report); });
+  for (const RigAxis& axis : devices.axes) {
+    guarded("axis " + axis.options.dof.name, stop, report, [&] { check_axis(axis, clock, report); });
+  }
+  for (const RigLamp& lamp : devices.lamps) {
+    guarded("lamp " + lamp.options.name, stop, report, [&] { check_lamp(lamp, clock, report); });
+  }
+}
+
+bool is_service_running(const Config& config) {
+  const std::string path = config.results_socket().string();
+  sockaddr_un address{};
+  if (path.size() >= sizeof address.sun_path) return false;
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, path.size());
+  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (descriptor < 0) return false;
+  const bool answered = connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  close(descriptor);
+  return answered;
+}
+
+}  // namespace eigenpose
