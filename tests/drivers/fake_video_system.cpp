@@ -219,7 +219,7 @@ class FakeVideoSystem::Device final : public VideoDevice {
       if (mode_.fourcc == V4L2_PIX_FMT_MJPEG) {
         filled.bytes = std::min(memory.size(), state_->camera.jpeg.size());
         std::copy_n(state_->camera.jpeg.begin(), filled.bytes, memory.begin());
-      } else {
+      } else if (state_->camera.fills_frames) {
         std::fill(memory.begin(), memory.end(), static_cast<std::uint8_t>(16 + sequence % 200));
       }
       if (state_->truncated > 0) {

@@ -47,6 +47,7 @@ struct FakeCamera {
   unsigned least_buffers = 2;       ///< what REQBUFS grants at most is `most_buffers`
   unsigned most_buffers = 8;
   std::vector<std::uint8_t> jpeg;  ///< sent as every MJPG frame
+  bool fills_frames = true;        ///< false: frames keep what their buffers hold, for measuring
 };
 
 /// A camera with YUYV at 640x480 and the usual controls.
