@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <stdexcept>
 
@@ -37,43 +38,11 @@ void check(const ModbusAxisOptions& options) {
   if (!(options.arrival_tolerance >= 0))
     refuse(fmt::format("arrival tolerance must not be negative, got {}", options.arrival_tolerance));
   if (!std::isfinite(options.zero_offset)) refuse("zero offset must be a number");
-  if (options.poll_interval <= Duration::zero()) refuse("poll interval must be above 0");
+  if (options.patience.poll_interval <= Duration::zero()) refuse("poll interval must be above 0");
   if (options.watchdog < Duration::zero() || options.watchdog > 10s) refuse("watchdog must be 0 … 10 s");
 }
 
-/// The cause alone, without "DEVICE: operation: ".
-std::string cause_of(const DeviceError& error) {
-  return std::string(error.what()).substr(error.device().size() + error.operation().size() + 4);
-}
-
-template <class Failure>
-[[noreturn]] void rethrow_with(const Failure& failure, const std::string& consequence) {
-  throw Failure(failure.device(), failure.operation(), cause_of(failure) + "; " + consequence);
-}
-
 }  // namespace
-
-/// Registers a motion so that `stop_motion` can end its wait; also ended by the caller's stop token.
-class ModbusAxis::Motion {
- public:
-  Motion(ModbusAxis& axis, const std::stop_token& caller)
-      : axis_(axis), on_caller_(caller, [this] { source_.request_stop(); }) {
-    const std::lock_guard lock(axis_.motion_mutex_);
-    axis_.motion_ = &source_;
-  }
-  Motion(const Motion&) = delete;
-  Motion& operator=(const Motion&) = delete;
-  ~Motion() {
-    const std::lock_guard lock(axis_.motion_mutex_);
-    axis_.motion_ = nullptr;
-  }
-  [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
-
- private:
-  ModbusAxis& axis_;
-  std::stop_source source_;
-  std::stop_callback<std::function<void()>> on_caller_;
-};
 
 ModbusAxis::ModbusAxis(ModbusProfile profile, ModbusAxisOptions options, std::shared_ptr<ModbusBus> bus,
                        const Clock& clock)
@@ -122,14 +91,6 @@ double ModbusAxis::position_of(std::int64_t steps) const {
 std::int64_t ModbusAxis::steps_of(double position) const {
   const double from_home = position + options_.zero_offset;
   return std::llround((options_.reversed ? -from_home : from_home) * options_.steps_per_unit);
-}
-
-double ModbusAxis::shown(double position) const {
-  return options_.dof.canonical(position);
-}
-
-std::string ModbusAxis::in_words(double position) const {
-  return fmt::format("{:.3f} {}", shown(position), options_.dof.unit);
 }
 
 RegisterFill ModbusAxis::motion_fill() const {
@@ -200,7 +161,7 @@ void ModbusAxis::write(const std::string& operation, const RegisterWrites& write
 AxisState ModbusAxis::state(TimePoint deadline) {
   const Reading reading = read("read state", deadline);
   if (!reading.moving) may_be_moving_ = false;
-  return {shown(reading.position), reading.moving, reading.homed, reading.alarm};
+  return {options_.dof.canonical(reading.position), reading.moving, reading.homed, reading.alarm};
 }
 
 void ModbusAxis::send_stop(TimePoint deadline) {
@@ -208,10 +169,7 @@ void ModbusAxis::send_stop(TimePoint deadline) {
 }
 
 void ModbusAxis::stop_motion() {
-  {
-    const std::lock_guard lock(motion_mutex_);
-    if (motion_ != nullptr) motion_->request_stop();
-  }
+  gate_.interrupt();
   send_stop(clock_.now() + stop_patience);
 }
 
@@ -262,10 +220,10 @@ ModbusAxis::Reading ModbusAxis::wait_for_standstill(const std::string& operation
     const Reading reading = read(operation, deadline);
     if (!reading.moving) return reading;
     if (clock_.now() >= patience)
-      throw DeviceError(
-          options_.name, operation,
-          fmt::format("it still moves although told to stop (at {})", in_words(reading.position)));
-    clock_.sleep_for(options_.poll_interval);
+      throw DeviceError(options_.name, operation,
+                        fmt::format("it still moves although told to stop (at {:.3f} {})",
+                                    options_.dof.canonical(reading.position), options_.dof.unit));
+    clock_.sleep_for(options_.patience.poll_interval);
   }
 }
 
@@ -290,7 +248,7 @@ ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation,
                       fmt::format("alarm: {}; remove the cause, then home the axis", *reading.alarm));
 
   write(operation, profile_.prepare, {}, deadline);
-  const TimePoint patience = std::min(deadline, clock_.now() + options_.start_time);
+  const TimePoint patience = std::min(deadline, clock_.now() + options_.patience.start_time);
   bool set_up_again = false;
   for (reading = read(operation, deadline); !reading.ready; reading = read(operation, deadline)) {
     if (stop.stop_requested()) throw Interrupted();
@@ -302,89 +260,47 @@ ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation,
     if (clock_.now() >= patience)
       throw DeviceError(options_.name, operation,
                         "the drive is not ready: is its power on and the motor enabled?");
-    clock_.sleep_until(clock_.now() + options_.poll_interval, stop);
+    clock_.sleep_until(clock_.now() + options_.patience.poll_interval, stop);
   }
   return reading;
 }
 
-ModbusAxis::Reading ModbusAxis::wait_for(const std::string& operation, Goal goal, double target,
-                                         TimePoint deadline, const std::stop_token& stop) {
-  const TimePoint start = clock_.now();
-  TimePoint last_change = start;
-  TimePoint still_since = start;
-  bool was_moving = false;
-  bool moved_at_all = false;
-  std::optional<std::int64_t> last_steps;
-  for (;;) {
-    if (stop.stop_requested()) throw Interrupted("stopped on request: " + options_.name + ": " + operation);
-    const Reading reading = read(operation, deadline);
-    const TimePoint now = clock_.now();
-    if (reading.alarm) throw DeviceError(options_.name, operation, "alarm: " + *reading.alarm);
-    if (last_steps && *last_steps != reading.steps) last_change = now;
-    last_steps = reading.steps;
-
-    if (reading.moving) {
-      was_moving = moved_at_all = true;
-      if (now - last_change >= options_.stall_time)
-        throw DeviceError(options_.name, operation,
-                          fmt::format("the motor is stuck at {}", in_words(reading.position)));
-    } else {
-      if (was_moving) still_since = now;
-      was_moving = false;
-      const bool settled = reading.in_position;
-      const bool there = goal == Goal::target
-                             ? std::abs(reading.position - target) <= info_.arrival_tolerance
-                             : reading.homed && (moved_at_all || now - start >= options_.start_time);
-      if (there && settled) return reading;
-      const Duration patience = moved_at_all ? options_.settle_time : options_.start_time;
-      if (now - still_since >= patience) {
-        if (goal == Goal::home)
-          throw DeviceError(options_.name, operation, "the drive stands still and is not homed");
-        throw DeviceError(options_.name, operation,
-                          fmt::format("{} at {}, not at {}: blocked, or steps were lost",
-                                      moved_at_all ? "it stopped" : "it did not move and stands",
-                                      in_words(reading.position), in_words(target)));
-      }
-    }
-    if (now >= deadline)
-      throw DeviceTimeout(options_.name, operation,
-                          fmt::format("not there by the deadline; it is at {}", in_words(reading.position)));
-    clock_.sleep_until(std::min(deadline, now + options_.poll_interval), stop);
-  }
-}
-
-ModbusAxis::Reading ModbusAxis::run(const std::string& operation, Goal goal, const RegisterWrites& command,
-                                    const RegisterFill& fill, TimePoint deadline,
-                                    const std::stop_token& stop) {
-  try {
-    if (stop.stop_requested()) throw Interrupted("stopped on request: " + options_.name + ": " + operation);
+ModbusAxis::Reading ModbusAxis::run(MotionWatch::Goal goal, const std::string& operation,
+                                    const RegisterWrites& command, const RegisterFill& fill,
+                                    TimePoint deadline, const std::stop_token& stop) {
+  const auto motion = [&] {
+    MotionWatch watch(options_.name, operation, options_.dof, goal, position_of(fill.position),
+                      info_.arrival_tolerance, options_.patience, clock_.now());
     may_be_moving_ = true;
     arm_watchdog(operation, deadline);
+    if (stop.stop_requested())
+      throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
     write(operation, command, fill, deadline);
-    const Reading reading = wait_for(operation, goal, position_of(fill.position), deadline, stop);
-    may_be_moving_ = false;
-    disarm_watchdog(operation, deadline);
-    return reading;
-  } catch (const Interrupted&) {
-    stop_after_failure();
-    throw;
-  } catch (const DeviceTimeout& failure) {
-    rethrow_with(failure, stop_after_failure());
-  } catch (const DeviceLost& failure) {
-    rethrow_with(failure, stop_after_failure());
-  } catch (const DeviceError& failure) {
-    rethrow_with(failure, stop_after_failure());
-  }
+    for (;;) {
+      if (stop.stop_requested())
+        throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
+      const Reading reading = read(operation, deadline);
+      const TimePoint now = clock_.now();
+      if (watch.arrived(reading, now, deadline)) {
+        may_be_moving_ = false;
+        disarm_watchdog(operation, deadline);
+        return reading;
+      }
+      clock_.sleep_until(std::min(deadline, now + options_.patience.poll_interval), stop);
+    }
+  };
+  return stopping_on_failure(motion, [this] { return stop_after_failure(); });
 }
 
 void ModbusAxis::home(TimePoint deadline, std::stop_token stop) {
-  const Motion motion(*this, stop);
+  const MotionGate::Passage motion(gate_, stop);
   const std::string operation = "home";
   if (motion.token().stop_requested()) throw Interrupted();
   read_ready_to_move(operation, true, deadline, motion.token());
   RegisterFill fill = motion_fill();
   fill.position = steps_of(-options_.zero_offset);
-  const Reading reading = run(operation, Goal::home, profile_.home, fill, deadline, motion.token());
+  const Reading reading =
+      run(MotionWatch::Goal::home, operation, profile_.home, fill, deadline, motion.token());
   homed_here_ = true;
   if (profile_.home_steps &&
       std::abs(position_of(reading.steps) - position_of(*profile_.home_steps)) > info_.arrival_tolerance) {
@@ -397,10 +313,8 @@ void ModbusAxis::home(TimePoint deadline, std::stop_token stop) {
 
 double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token stop) {
   const Dof& dof = options_.dof;
-  if (!(position >= dof.lower && position <= dof.upper))
-    throw std::out_of_range(
-        fmt::format("{}: {} {} is outside {} … {}", options_.name, position, dof.unit, dof.lower, dof.upper));
-  const Motion motion(*this, stop);
+  check_target(options_.name, dof, position);
+  const MotionGate::Passage motion(gate_, stop);
   const std::string operation = fmt::format("move to {} {}", position, dof.unit);
   if (motion.token().stop_requested()) throw Interrupted();
   const Reading before = read_ready_to_move(operation, false, deadline, motion.token());
@@ -408,14 +322,14 @@ double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token 
 
   RegisterFill fill = motion_fill();
   // The drive counts on over whole turns; the way to go is the short one from where it is.
-  double target = before.position + dof.difference(position, before.position);
-  fill.position = steps_of(target);
+  fill.position = steps_of(nearest_target(dof, position, before.position));
   if (std::abs(fill.position) > std::numeric_limits<std::int32_t>::max() && dof.periodic) {
-    target = dof.canonical(position);  // the counter is at its end: the long way, once in a lifetime
-    fill.position = steps_of(target);
+    // The counter is at its end: the long way, once in a lifetime.
+    fill.position = steps_of(dof.canonical(position));
   }
-  const Reading after = run(operation, Goal::target, profile_.move, fill, deadline, motion.token());
-  return shown(after.position);
+  const Reading after =
+      run(MotionWatch::Goal::target, operation, profile_.move, fill, deadline, motion.token());
+  return options_.dof.canonical(after.position);
 }
 
 }  // namespace eigenpose

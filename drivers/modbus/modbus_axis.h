@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "drivers/axis.h"
 #include "drivers/modbus/modbus_bus.h"
 #include "drivers/modbus/profile.h"
+#include "drivers/motion.h"
 
 namespace eigenpose {
 
@@ -27,12 +27,7 @@ struct ModbusAxisOptions {
   double speed = 20.0;             ///< unit/s, above 0
   double acceleration = 40.0;      ///< unit/s², above 0
   double arrival_tolerance = 0.0;  ///< in the unit; 0: two steps
-  Duration poll_interval = std::chrono::milliseconds(20);  ///< between two looks at a moving axis
-  Duration start_time = std::chrono::milliseconds(500);    ///< within which a command must show effect
-  Duration settle_time =
-      std::chrono::milliseconds(500);  ///< within which a motor that has stopped is at its target
-  Duration stall_time =
-      std::chrono::seconds(2);  ///< a position that does not change for so long is a stuck motor
+  MotionPatience patience;
   /// Silence after which the drive stops by itself, where the profile has a watchdog; 0: not used. It is
   /// armed for the time of a motion only, so that a resting drive raises no alarm. Longer than a failing
   /// transaction takes.
@@ -66,18 +61,11 @@ class ModbusAxis final : public Axis {
     std::uint16_t address = 0;
     int count = 0;
   };
-  struct Reading {
-    bool moving = false;
+  struct Reading : MotionReading {
     bool ready = true;
-    bool in_position = true;
-    bool homed = false;
-    std::optional<std::string> alarm;
     bool silence_alarm = false;
     std::int64_t steps = 0;
-    double position = 0.0;  ///< in the unit, not canonical
   };
-  enum class Goal { home, target };
-  class Motion;
 
   Reading read(const std::string& operation, TimePoint deadline);
   Reading read_ready_to_move(const std::string& operation, bool clear_any_alarm, TimePoint deadline,
@@ -87,10 +75,9 @@ class ModbusAxis final : public Axis {
   void clear_alarm(const std::string& operation, TimePoint deadline);
   void set_up_after_connecting(const std::string& operation, TimePoint deadline);
   Reading wait_for_standstill(const std::string& operation, TimePoint deadline);
-  Reading run(const std::string& operation, Goal goal, const RegisterWrites& command,
+  /// Sends `command` and waits. On every way but arrival the drive has been told to stop.
+  Reading run(MotionWatch::Goal goal, const std::string& operation, const RegisterWrites& command,
               const RegisterFill& fill, TimePoint deadline, const std::stop_token& stop);
-  Reading wait_for(const std::string& operation, Goal goal, double target, TimePoint deadline,
-                   const std::stop_token& stop);
   /// Tries to stop after a failure; never throws. Says in words how it went.
   std::string stop_after_failure();
   void send_stop(TimePoint deadline);
@@ -99,8 +86,6 @@ class ModbusAxis final : public Axis {
 
   [[nodiscard]] double position_of(std::int64_t steps) const;
   [[nodiscard]] std::int64_t steps_of(double position) const;
-  [[nodiscard]] double shown(double position) const;
-  [[nodiscard]] std::string in_words(double position) const;
   [[nodiscard]] RegisterFill motion_fill() const;
 
   ModbusProfile profile_;
@@ -114,8 +99,7 @@ class ModbusAxis final : public Axis {
   bool homed_here_ = false;  ///< for profiles without a homed bit
   std::atomic<bool> may_be_moving_{false};
 
-  std::mutex motion_mutex_;
-  std::stop_source* motion_ = nullptr;  ///< guarded by motion_mutex_: ends the wait of the motion under way
+  MotionGate gate_;
 };
 
 }  // namespace eigenpose
