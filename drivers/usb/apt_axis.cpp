@@ -24,6 +24,8 @@ constexpr Duration standstill_patience = 5s;  ///< for a motor that is told to s
 constexpr Duration quiet = 50ms;              ///< silence after which no part of an old message can follow
 constexpr double default_tolerance_counts = 20.0;
 constexpr std::uint8_t stop_along_the_ramp = 2;
+constexpr std::uint8_t channel_on = 1;
+constexpr std::uint8_t channel_off = 2;
 
 void check(const AptAxisOptions& options) {
   const auto refuse = [&](const std::string& what) {
@@ -151,7 +153,7 @@ void AptAxis::set_up(const std::string& operation, TimePoint deadline) {
   transmit(apt::short_message(Message::hw_stop_updates, 0, 0, options_.controller), deadline);
   transmit(apt::short_message(Message::hw_request_info, 0, 0, options_.controller), deadline);
   (void)wait_for(Message::hw_info, operation, deadline);
-  transmit(apt::short_message(Message::set_channel_enabled, options_.channel, 1, options_.controller),
+  transmit(apt::short_message(Message::set_channel_enabled, options_.channel, channel_on, options_.controller),
            deadline);
   transmit(apt::set_velocity(options_.channel,
                              controller_number(options_.acceleration * options_.stage.acceleration_per_unit),
@@ -246,6 +248,15 @@ MotionReading AptAxis::read_at_rest(const std::string& operation, bool forget_fa
   if (reading.alarm && forget_faults) {
     {
       const std::lock_guard lock(link_mutex_);
+      // The controller forgets a motion error when the channel is switched off and on.
+      with_retries(operation, deadline, [&] {
+        transmit(apt::short_message(Message::set_channel_enabled, options_.channel, channel_off,
+                                    options_.controller),
+                 deadline);
+        transmit(apt::short_message(Message::set_channel_enabled, options_.channel, channel_on,
+                                    options_.controller),
+                 deadline);
+      });
       fault_.reset();
     }
     reading = read(operation, deadline);

@@ -1,0 +1,188 @@
+// The Modbus axis on simulated drives: the conformance suite over TCP and RTU, with and without a line that spoils one
+// request in ten, and what is Modbus's own.
+
+#include "drivers/modbus/modbus_axis.h"
+
+#include <cmath>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "config/modbus_profile.h"
+#include "core/base/error.h"
+#include "tests/drivers/modbus_rig.h"
+
+namespace eigenpose {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::WireFault;
+using sim::WireFaultKind;
+using testing::HasSubstr;
+
+constexpr double one_in_ten = 0.1;
+
+AxisRigCase rig_case(const std::string& name, ModbusLine line, double fault_rate) {
+  return {name, [=] { return std::make_unique<ModbusRig>(line, fault_rate); }};
+}
+
+INSTANTIATE_TEST_SUITE_P(Modbus, AxisConformance,
+                         testing::Values(rig_case("Tcp", ModbusLine::tcp, 0.0),
+                                         rig_case("Rtu", ModbusLine::rtu, 0.0),
+                                         rig_case("TcpWithFaults", ModbusLine::tcp, one_in_ten),
+                                         rig_case("RtuWithFaults", ModbusLine::rtu, one_in_ten)),
+                         rig_name);
+
+TimePoint soon() { return std::chrono::steady_clock::now() + 20s; }
+
+std::string failure_of(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "no failure";
+}
+
+class ModbusAxisTest : public testing::Test {
+ protected:
+  ModbusRig rig_{ModbusLine::tcp, 0.0};
+};
+
+TEST_F(ModbusAxisTest, ASpoiltAnswerIsAskedForAgain) {
+  for (const WireFaultKind kind : {WireFaultKind::silence, WireFaultKind::loss, WireFaultKind::partial,
+                                   WireFaultKind::wrong_unit, WireFaultKind::wrong_transaction,
+                                   WireFaultKind::close_connection}) {
+    const auto before = rig_.bus()->statistics();
+    rig_.faults().add({kind});
+    EXPECT_NO_THROW(rig_.axis().state(soon())) << static_cast<int>(kind);
+    const auto after = rig_.bus()->statistics();
+    EXPECT_EQ(after.failures, before.failures + 1) << static_cast<int>(kind);
+    EXPECT_EQ(after.connections, std::max<std::uint64_t>(before.connections, 1) + 1) << "a new connection";
+  }
+}
+
+TEST_F(ModbusAxisTest, GivesUpAfterTheAttemptsItHasAndSaysWhy) {
+  rig_.faults().add({WireFaultKind::wrong_unit}, 3);
+  const std::string text = failure_of([&] { rig_.axis().state(soon()); });
+  EXPECT_THAT(text, HasSubstr("table: read state: answer from another unit"));
+  EXPECT_THAT(text, HasSubstr("tried 3 times"));
+  EXPECT_THAT(text, HasSubstr("127.0.0.1"));
+}
+
+TEST_F(ModbusAxisTest, ARefusalIsNotAskedForAgain) {
+  rig_.faults().add({WireFaultKind::exception, {}, 2});
+  const std::string text = failure_of([&] { rig_.axis().state(soon()); });
+  EXPECT_THAT(text, HasSubstr("illegal address"));
+  EXPECT_EQ(rig_.bus()->statistics().failures, 1U);
+  EXPECT_NO_THROW(rig_.axis().state(soon()));
+  EXPECT_EQ(rig_.bus()->statistics().connections, 1U) << "a refusal is an answer: the connection stays";
+}
+
+TEST_F(ModbusAxisTest, AnAbsentServerIsNamedWithWhatToDo) {
+  rig_.unplug();
+  EXPECT_THROW(rig_.axis().state(soon()), DeviceLost);
+  EXPECT_THAT(failure_of([&] { rig_.axis().state(soon()); }), HasSubstr("nothing listens there"));
+}
+
+TEST_F(ModbusAxisTest, AUnitThatNobodyHasIsNamed) {
+  ModbusAxisOptions options = rig_.options();
+  options.unit = 99;
+  SteadyClock clock;
+  ModbusAxis axis(oriental_motor_az_profile(), options, rig_.bus(), clock);
+  EXPECT_THAT(failure_of([&] { axis.state(soon()); }), HasSubstr("unit number"));
+}
+
+TEST_F(ModbusAxisTest, SaysTheAlarmThatTheDriveRaised) {
+  rig_.axis().home(soon(), {});
+  rig_.drive().raise_alarm(0x66);
+  EXPECT_THAT(*rig_.axis().state(soon()).alarm, HasSubstr("limit switch reached"));
+  EXPECT_THAT(failure_of([&] { rig_.axis().move_to(30.0, soon(), {}); }), HasSubstr("limit switch reached"));
+}
+
+TEST_F(ModbusAxisTest, ReversedAxesAndOffsetsAreHeeded) {
+  ModbusAxisOptions options = rig_.options();
+  options.reversed = true;
+  options.zero_offset = 10.0;
+  SteadyClock clock;
+  ModbusAxis axis(oriental_motor_az_profile(), options, rig_.bus(), clock);
+  axis.home(soon(), {});
+  EXPECT_NEAR(axis.state(soon()).position, 350.0, 0.05) << "home lies 10 before the axis's zero";
+  axis.move_to(30.0, soon(), {});
+  EXPECT_NEAR(rig_.true_position(), 320.0, 0.05) << "30 + 10 the other way";
+}
+
+TEST_F(ModbusAxisTest, SeveralAxesShareOneBus) {
+  SteadyClock clock;
+  ModbusAxisOptions options = rig_.options();
+  options.name = "arm_azimuth";
+  options.unit = 2;
+  options.dof = {"arm_azimuth", "deg", -90.0, 180.0, false};
+  ModbusAxis arm(oriental_motor_az_profile(), options, rig_.bus(), clock);
+  rig_.axis().home(soon(), {});
+  arm.home(soon(), {});
+  std::jthread other([&] { rig_.axis().move_to(90.0, soon(), {}); });
+  EXPECT_NEAR(arm.move_to(60.0, soon(), {}), 60.0, 0.05);
+  other.join();
+  EXPECT_NEAR(rig_.true_position(), 90.0, 0.05);
+  EXPECT_NEAR(rig_.lab().axis_position_deg(sim::LabAxis::arm_azimuth, clock.now()), 60.0, 0.05);
+  EXPECT_EQ(rig_.bus()->statistics().connections, 1U);
+}
+
+TEST_F(ModbusAxisTest, BacklashOfTheTableIsNotTheDrivesError) {
+  rig_.axis().home(soon(), {});
+  rig_.drive().set_faults({.backlash_deg = 0.02});
+  EXPECT_NEAR(rig_.axis().move_to(30.0, soon(), {}), 30.0, 0.01);
+}
+
+TEST(ModbusAxisWatchdog, ADeadDriverMeansAStoppedTable) {
+  ModbusRig rig(ModbusLine::tcp, 0.0, 150ms);
+  rig.axis().home(soon(), {});
+  std::jthread mover([&] { EXPECT_THROW(rig.axis().move_to(170.0, soon(), {}), DeviceError); });
+  while (!rig.truly_moving()) std::this_thread::yield();
+  rig.unplug();  // nobody speaks to the drive any more, and nobody can tell it to stop
+  mover.join();
+  while (rig.truly_moving()) std::this_thread::yield();
+  EXPECT_GT(std::abs(rig.true_position() - 170.0), 1.0);
+  EXPECT_EQ(rig.drive().alarm(), 0x85);
+  rig.plug_in();
+  EXPECT_NO_THROW(rig.axis().move_to(20.0, soon(), {})) << "an alarm of silence is no reason to refuse";
+}
+
+TEST(ModbusAxisWatchdog, ARestingDriveRaisesNoAlarm) {
+  ModbusRig rig(ModbusLine::tcp, 0.0, 100ms);
+  rig.axis().home(soon(), {});
+  rig.axis().move_to(10.0, soon(), {});
+  std::this_thread::sleep_for(250ms);  // longer than the watchdog's patience: silence is what is tested
+  EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
+}
+
+TEST(ModbusAxisWatchdog, AStoppedMoveLeavesNoWatchdogArmed) {
+  ModbusRig rig(ModbusLine::tcp, 0.0, 100ms);
+  rig.axis().home(soon(), {});
+  EXPECT_THROW(rig.axis().move_to(170.0, std::chrono::steady_clock::now() + 60ms, {}), DeviceTimeout);
+  std::this_thread::sleep_for(250ms);  // longer than the watchdog's patience: silence is what is tested
+  EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
+}
+
+TEST(ModbusAxisOptionsCheck, ImpossibleOnesAreRefusedBeforeAnythingIsOpened) {
+  SteadyClock clock;
+  const auto bus = std::make_shared<ModbusBus>(ModbusBusOptions{ModbusTcpEndpoint{"127.0.0.1", 1}}, clock);
+  const auto refused = [&](auto spoil) {
+    ModbusAxisOptions options;
+    spoil(options);
+    EXPECT_THROW(ModbusAxis(oriental_motor_az_profile(), options, bus, clock), std::invalid_argument);
+  };
+  refused([](ModbusAxisOptions& o) { o.steps_per_unit = 0.0; });
+  refused([](ModbusAxisOptions& o) { o.unit = 248; });
+  refused([](ModbusAxisOptions& o) { o.speed = -1.0; });
+  refused([](ModbusAxisOptions& o) { o.acceleration = 0.0; });
+  refused([](ModbusAxisOptions& o) { o.dof.upper = o.dof.lower; });
+  refused([](ModbusAxisOptions& o) { o.name.clear(); });
+  EXPECT_THROW(ModbusAxis(oriental_motor_az_profile(), {}, nullptr, clock), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace eigenpose

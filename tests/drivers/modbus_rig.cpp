@@ -1,0 +1,131 @@
+#include "tests/drivers/modbus_rig.h"
+
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "config/modbus_profile.h"
+
+namespace eigenpose {
+
+namespace {
+
+using namespace std::chrono_literals;
+using sim::WireFault;
+using sim::WireFaultKind;
+
+constexpr auto response_timeout = 60ms;
+constexpr std::uint64_t seed = 11;
+
+std::filesystem::path new_folder() {
+  std::string name = (std::filesystem::temp_directory_path() / "eigenpose-rtu-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  return name;
+}
+
+}  // namespace
+
+std::vector<WireFault> survivable_faults(ModbusLine line) {
+  std::vector<WireFault> faults = {
+      {WireFaultKind::silence},
+      {WireFaultKind::loss},
+      {WireFaultKind::late, response_timeout / 2},
+      {WireFaultKind::late, response_timeout + 30ms},  // after the driver has given up
+      {WireFaultKind::partial},
+      {WireFaultKind::wrong_unit},
+      {WireFaultKind::exception, {}, 6},  // "busy"
+  };
+  if (line == ModbusLine::tcp) {
+    faults.push_back({WireFaultKind::wrong_transaction});
+    faults.push_back({WireFaultKind::close_connection});
+  } else {
+    faults.push_back({WireFaultKind::bad_crc});
+  }
+  return faults;
+}
+
+ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::milliseconds watchdog)
+    : lab_(clock_), line_(line), fault_rate_(fault_rate) {
+  constexpr double quick = 12.0;  // a table of 30 deg/s and 60 deg/s² crosses a half turn in 0.6 s
+  ModbusBusOptions bus;
+  if (line == ModbusLine::tcp) {
+    tcp_.emplace(lab_, sim::SimModbusServerOptions{.speed_factor = quick});
+    bus.endpoint = ModbusTcpEndpoint{"127.0.0.1", tcp_->port()};
+  } else {
+    folder_ = new_folder();
+    rtu_.emplace(lab_, sim::SimRtuServerOptions{.port = folder_ / "line", .speed_factor = quick});
+    bus.endpoint = ModbusRtuEndpoint{.device = (folder_ / "line").string()};
+  }
+  bus.response_timeout = response_timeout;
+  bus.retry_pause = 5ms;
+  bus.attempts = fault_rate > 0.0 ? 8 : 3;
+  bus_ = std::make_shared<ModbusBus>(bus, clock_);
+
+  const ModbusProfile profile = oriental_motor_az_profile();
+  options_.speed = profile.defaults.speed;
+  options_.acceleration = profile.defaults.acceleration;
+  options_.arrival_tolerance = profile.defaults.arrival_tolerance;
+  options_.patience.poll_interval = 5ms;
+  options_.patience.start_time = 200ms;
+  options_.patience.settle_time = 200ms;
+  options_.patience.stall_time = 500ms;
+  options_.watchdog = watchdog;
+  axis_ = std::make_unique<ModbusAxis>(profile, options_, bus_, clock_);
+  random_faults();
+}
+
+ModbusRig::~ModbusRig() {
+  faults().clear();
+  axis_.reset();
+  rtu_.reset();
+  if (!folder_.empty()) std::filesystem::remove_all(folder_);
+}
+
+void ModbusRig::random_faults() {
+  faults().clear();
+  if (fault_rate_ > 0.0) faults().at_random(fault_rate_, seed, survivable_faults(line_));
+}
+
+double ModbusRig::true_position() {
+  return wrap(lab_.axis_position_deg(sim::LabAxis::table, clock_.now()), 0.0, 360.0);
+}
+
+bool ModbusRig::truly_moving() {
+  const TimePoint now = clock_.now();
+  return lab_.axis_position_deg(sim::LabAxis::table, now) !=
+         lab_.axis_position_deg(sim::LabAxis::table, now - 2ms);
+}
+
+void ModbusRig::silence(bool silent) {
+  random_faults();
+  if (silent) faults().at_random(1.0, seed, {{WireFaultKind::loss}});
+}
+
+void ModbusRig::unplug() {
+  if (tcp_)
+    tcp_->die();
+  else
+    rtu_->unplug();
+}
+
+void ModbusRig::plug_in() {
+  if (tcp_)
+    tcp_->revive();
+  else
+    rtu_->plug_in();
+}
+
+void ModbusRig::jam(bool jammed) {
+  drive().set_faults({.stuck = jammed});
+}
+
+void ModbusRig::slip() {
+  drive().set_faults({.slip_steps = 40.0});
+}
+
+void ModbusRig::raise_alarm() {
+  drive().raise_alarm(0x30);
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,64 @@
+#pragma once
+
+/// A simulated drive of the lab, the real driver in front of it, and a Modbus line between them.
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "core/base/clock.h"
+#include "drivers/modbus/modbus_axis.h"
+#include "sim/lab/sim_lab.h"
+#include "sim/modbus/modbus_server.h"
+#include "sim/modbus/rtu_server.h"
+#include "tests/drivers/axis_conformance.h"
+
+namespace eigenpose {
+
+enum class ModbusLine { tcp, rtu };
+
+/// What may go wrong on the line while the suite runs: everything that the driver can live through.
+std::vector<sim::WireFault> survivable_faults(ModbusLine line);
+
+class ModbusRig final : public AxisRig {
+ public:
+  /// @param fault_rate of all requests, meets one of `survivable_faults`.
+  ModbusRig(ModbusLine line, double fault_rate,
+            std::chrono::milliseconds watchdog = std::chrono::milliseconds(0));
+  ~ModbusRig() override;
+
+  Axis& axis() override { return *axis_; }
+  void discard_axis() override { axis_.reset(); }
+  double true_position() override;
+  bool truly_moving() override;
+  void silence(bool silent) override;
+  void unplug() override;
+  void plug_in() override;
+  void jam(bool jammed) override;
+  void slip() override;
+  void raise_alarm() override;
+
+  sim::SimLab& lab() { return lab_; }
+  sim::AzDrive& drive() { return tcp_ ? tcp_->drive(1) : rtu_->drive(1); }
+  sim::FaultPlan& faults() { return tcp_ ? tcp_->faults() : rtu_->faults(); }
+  std::shared_ptr<ModbusBus> bus() { return bus_; }
+  /// Another axis of the same table on the same bus.
+  ModbusAxisOptions options() const { return options_; }
+
+ private:
+  void random_faults();
+
+  SteadyClock clock_;
+  sim::SimLab lab_;
+  ModbusLine line_;
+  double fault_rate_;
+  std::filesystem::path folder_;
+  std::optional<sim::SimModbusServer> tcp_;
+  std::optional<sim::SimRtuServer> rtu_;
+  std::shared_ptr<ModbusBus> bus_;
+  ModbusAxisOptions options_;
+  std::unique_ptr<ModbusAxis> axis_;
+};
+
+}  // namespace eigenpose
