@@ -112,21 +112,26 @@ template <class Failure>
   throw Failure(failure.device(), failure.operation(), cause + "; " + consequence);
 }
 
-/// Calls `work`; when it fails, calls `stop` (which says in words what became of the motor and does not
-/// throw) and throws the failure on with those words.
-template <class Work, class Stop>
-auto stopping_on_failure(const Work& work, const Stop& stop) {
+/// Calls `work`; when it fails, calls `halt` (which says in words what became of the motor and does not
+/// throw) and throws the failure on with those words. A refusal after `stop` was requested is what the stop
+/// has brought about: Interrupted.
+template <class Work, class Halt>
+auto stopping_on_failure(const std::stop_token& stop, const Work& work, const Halt& halt) {
   try {
     return work();
   } catch (const Interrupted&) {
-    stop();
+    halt();
     throw;
   } catch (const DeviceTimeout& failure) {
-    rethrow_with(failure, stop());
+    rethrow_with(failure, halt());
   } catch (const DeviceLost& failure) {
-    rethrow_with(failure, stop());
+    rethrow_with(failure, halt());
   } catch (const DeviceError& failure) {
-    rethrow_with(failure, stop());
+    const std::string consequence = halt();
+    if (stop.stop_requested())
+      throw Interrupted(failure.device() + ": " + failure.operation() + ": interrupted on request; " +
+                        consequence);
+    rethrow_with(failure, consequence);
   }
 }
 

@@ -289,7 +289,7 @@ ModbusAxis::Reading ModbusAxis::run(MotionWatch::Goal goal, const std::string& o
       clock_.sleep_until(std::min(deadline, now + options_.patience.poll_interval), stop);
     }
   };
-  return stopping_on_failure(motion, [this] { return stop_after_failure(); });
+  return stopping_on_failure(stop, motion, [this] { return stop_after_failure(); });
 }
 
 void ModbusAxis::home(TimePoint deadline, std::stop_token stop) {

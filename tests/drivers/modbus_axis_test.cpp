@@ -1,5 +1,5 @@
-// The Modbus axis on simulated drives: the conformance suite over TCP and RTU, with and without a line that spoils one
-// request in ten, and what is Modbus's own.
+// The Modbus axis on simulated drives: the conformance suite over TCP and RTU, with and without a line that
+// spoils one request in twenty, and what is Modbus's own.
 
 #include "drivers/modbus/modbus_axis.h"
 
@@ -22,7 +22,7 @@ using sim::WireFault;
 using sim::WireFaultKind;
 using testing::HasSubstr;
 
-constexpr double one_in_ten = 0.1;
+constexpr double one_in_twenty = 0.05;
 
 AxisRigCase rig_case(const std::string& name, ModbusLine line, double fault_rate) {
   return {name, [=] { return std::make_unique<ModbusRig>(line, fault_rate); }};
@@ -31,11 +31,13 @@ AxisRigCase rig_case(const std::string& name, ModbusLine line, double fault_rate
 INSTANTIATE_TEST_SUITE_P(Modbus, AxisConformance,
                          testing::Values(rig_case("Tcp", ModbusLine::tcp, 0.0),
                                          rig_case("Rtu", ModbusLine::rtu, 0.0),
-                                         rig_case("TcpWithFaults", ModbusLine::tcp, one_in_ten),
-                                         rig_case("RtuWithFaults", ModbusLine::rtu, one_in_ten)),
+                                         rig_case("TcpWithFaults", ModbusLine::tcp, one_in_twenty),
+                                         rig_case("RtuWithFaults", ModbusLine::rtu, one_in_twenty)),
                          rig_name);
 
-TimePoint soon() { return std::chrono::steady_clock::now() + 20s; }
+TimePoint soon() {
+  return std::chrono::steady_clock::now() + 20s;
+}
 
 std::string failure_of(const std::function<void()>& work) {
   try {
@@ -52,9 +54,9 @@ class ModbusAxisTest : public testing::Test {
 };
 
 TEST_F(ModbusAxisTest, ASpoiltAnswerIsAskedForAgain) {
-  for (const WireFaultKind kind : {WireFaultKind::silence, WireFaultKind::loss, WireFaultKind::partial,
-                                   WireFaultKind::wrong_unit, WireFaultKind::wrong_transaction,
-                                   WireFaultKind::close_connection}) {
+  for (const WireFaultKind kind :
+       {WireFaultKind::silence, WireFaultKind::loss, WireFaultKind::partial, WireFaultKind::wrong_unit,
+        WireFaultKind::wrong_transaction, WireFaultKind::close_connection}) {
     const auto before = rig_.bus()->statistics();
     rig_.faults().add({kind});
     EXPECT_NO_THROW(rig_.axis().state(soon())) << static_cast<int>(kind);
@@ -65,10 +67,10 @@ TEST_F(ModbusAxisTest, ASpoiltAnswerIsAskedForAgain) {
 }
 
 TEST_F(ModbusAxisTest, GivesUpAfterTheAttemptsItHasAndSaysWhy) {
-  rig_.faults().add({WireFaultKind::wrong_unit}, 3);
+  rig_.faults().add({WireFaultKind::wrong_unit}, 4);
   const std::string text = failure_of([&] { rig_.axis().state(soon()); });
   EXPECT_THAT(text, HasSubstr("table: read state: answer from another unit"));
-  EXPECT_THAT(text, HasSubstr("tried 3 times"));
+  EXPECT_THAT(text, HasSubstr("tried 4 times"));
   EXPECT_THAT(text, HasSubstr("127.0.0.1"));
 }
 
@@ -152,18 +154,18 @@ TEST(ModbusAxisWatchdog, ADeadDriverMeansAStoppedTable) {
 }
 
 TEST(ModbusAxisWatchdog, ARestingDriveRaisesNoAlarm) {
-  ModbusRig rig(ModbusLine::tcp, 0.0, 100ms);
+  ModbusRig rig(ModbusLine::tcp, 0.0, 80ms);
   rig.axis().home(soon(), {});
   rig.axis().move_to(10.0, soon(), {});
-  std::this_thread::sleep_for(250ms);  // longer than the watchdog's patience: silence is what is tested
+  std::this_thread::sleep_for(150ms);  // longer than the watchdog's patience: silence is what is tested
   EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
 }
 
 TEST(ModbusAxisWatchdog, AStoppedMoveLeavesNoWatchdogArmed) {
-  ModbusRig rig(ModbusLine::tcp, 0.0, 100ms);
+  ModbusRig rig(ModbusLine::tcp, 0.0, 80ms);
   rig.axis().home(soon(), {});
   EXPECT_THROW(rig.axis().move_to(170.0, std::chrono::steady_clock::now() + 60ms, {}), DeviceTimeout);
-  std::this_thread::sleep_for(250ms);  // longer than the watchdog's patience: silence is what is tested
+  std::this_thread::sleep_for(150ms);  // longer than the watchdog's patience: silence is what is tested
   EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
 }
 

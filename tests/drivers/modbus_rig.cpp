@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 using sim::WireFault;
 using sim::WireFaultKind;
 
-constexpr auto response_timeout = 60ms;
+constexpr auto response_timeout = 40ms;
 constexpr std::uint64_t seed = 11;
 
 std::filesystem::path new_folder() {
@@ -47,7 +47,7 @@ std::vector<WireFault> survivable_faults(ModbusLine line) {
 
 ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::milliseconds watchdog)
     : lab_(clock_), line_(line), fault_rate_(fault_rate) {
-  constexpr double quick = 12.0;  // a table of 30 deg/s and 60 deg/s² crosses a half turn in 0.6 s
+  constexpr double quick = 30.0;  // a table of 30 deg/s and 60 deg/s² crosses a half turn in 0.2 s
   ModbusBusOptions bus;
   if (line == ModbusLine::tcp) {
     tcp_.emplace(lab_, sim::SimModbusServerOptions{.speed_factor = quick});
@@ -59,7 +59,7 @@ ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::millisecon
   }
   bus.response_timeout = response_timeout;
   bus.retry_pause = 5ms;
-  bus.attempts = fault_rate > 0.0 ? 8 : 3;
+  bus.attempts = fault_rate > 0.0 ? 8 : 4;
   bus_ = std::make_shared<ModbusBus>(bus, clock_);
 
   const ModbusProfile profile = oriental_motor_az_profile();
@@ -67,9 +67,9 @@ ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::millisecon
   options_.acceleration = profile.defaults.acceleration;
   options_.arrival_tolerance = profile.defaults.arrival_tolerance;
   options_.patience.poll_interval = 5ms;
-  options_.patience.start_time = 200ms;
-  options_.patience.settle_time = 200ms;
-  options_.patience.stall_time = 500ms;
+  options_.patience.start_time = 80ms;
+  options_.patience.settle_time = 80ms;
+  options_.patience.stall_time = 300ms;
   options_.watchdog = watchdog;
   axis_ = std::make_unique<ModbusAxis>(profile, options_, bus_, clock_);
   random_faults();
