@@ -90,6 +90,8 @@ std::int32_t AptAxis::counts_of(const std::string& operation, double position) c
 
 template <class Work>
 auto AptAxis::with_retries(const std::string& operation, TimePoint deadline, const Work& work) {
+  if (clock_.now() >= deadline)
+    throw DeviceTimeout(options_.name, operation, "no time left before the deadline");
   for (int attempt = 1;; ++attempt) {
     try {
       if (link_suspect_) {
@@ -131,15 +133,19 @@ void AptAxis::transmit(std::span<const std::uint8_t> message, TimePoint deadline
 apt::Received AptAxis::wait_for(Message number, const std::string& operation, TimePoint deadline) {
   const TimePoint patience = std::min(deadline, clock_.now() + options_.response_timeout);
   std::array<std::uint8_t, 256> buffer{};
+  std::optional<apt::Received> answer;
   for (;;) {
     try {
       while (auto message = unpacker_.next()) {
         if (auto words = apt::fault_of(*message)) fault_ = std::move(words);
-        if (message->number == static_cast<std::uint16_t>(number)) return *message;
+        if (message->number == static_cast<std::uint16_t>(number)) answer = std::move(message);
       }
     } catch (const std::runtime_error& error) {
       throw DeviceError(options_.name, operation, error.what());
     }
+    // Messages have no checksum. If bytes of one were lost, those of the next fill its place, and what is
+    // left over is no message: so an answer counts only when the stream stands between two messages.
+    if (answer && unpacker_.between_messages()) return std::move(*answer);
     const std::size_t count = link_->read(buffer, patience);
     if (count == 0) throw DeviceTimeout(options_.name, operation, "no answer");
     unpacker_.feed(std::span(buffer).first(count));
@@ -187,8 +193,10 @@ MotionReading AptAxis::read(const std::string& operation, TimePoint deadline) {
   MotionReading reading;
   reading.moving = (status.bits & (StatusBits::moving | StatusBits::homing)) != 0;
   reading.homed = (status.bits & StatusBits::homed) != 0;
-  if ((status.bits & StatusBits::motion_error) != 0) fault_ = "the motor lags behind: blocked or overloaded";
-  if ((status.bits & StatusBits::overcurrent) != 0)
+  // What the controller said in words goes before what its bits say.
+  if ((status.bits & StatusBits::motion_error) != 0 && !fault_)
+    fault_ = "the motor lags behind: blocked or overloaded";
+  if ((status.bits & StatusBits::overcurrent) != 0 && !fault_)
     fault_ = "the motor draws too much current: blocked or overloaded";
   reading.alarm = fault_;
   reading.position = position_of(status.position);

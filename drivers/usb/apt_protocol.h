@@ -91,6 +91,8 @@ class Unpacker {
   /// The next whole message, if there is one. @throws std::runtime_error when what stands there cannot be a
   /// message: the place in the stream is lost; `clear` and begin anew.
   std::optional<Received> next();
+  /// No part of a message waits for its rest.
+  [[nodiscard]] bool between_messages() const { return buffer_.empty(); }
   void clear() { buffer_.clear(); }
 
  private:

@@ -122,6 +122,8 @@ void EnttecDmxLamp::show(double level, const std::vector<DmxChannel>& channels, 
   const std::vector<std::uint8_t> frame = message(label_send_dmx, data);
 
   const std::string operation = fmt::format("set level {:.3f}", level);
+  if (clock_.now() >= deadline)
+    throw DeviceTimeout(options_.name, operation, "no time left before the deadline");
   may_be_lit_ = true;
   for (int attempt = 1;; ++attempt) {
     try {

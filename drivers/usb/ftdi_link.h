@@ -20,11 +20,11 @@ namespace eigenpose {
 enum class FtdiFlowControl { none, rts_cts, xon_xoff };
 
 struct FtdiLinkOptions {
-  std::string serial;  ///< of the chip, as `list_ftdi_devices` shows it; empty: the only one that is there
-  int interface = 0;   ///< channel of a chip that has several, 0 … 3
-  int baud = 115200;   ///< 184 … 3,000,000
-  char parity = 'N';   ///< 'N', 'E', 'O'
-  int stop_bits = 1;   ///< 1 or 2
+  std::string serial{};  ///< of the chip, as `list_ftdi_devices` shows it; empty: the only one that is there
+  int interface = 0;     ///< channel of a chip that has several, 0 … 3
+  int baud = 115200;     ///< 184 … 3,000,000
+  char parity = 'N';     ///< 'N', 'E', 'O'
+  int stop_bits = 1;     ///< 1 or 2
   FtdiFlowControl flow_control = FtdiFlowControl::none;
   /// How long the chip gathers bytes before it sends an unfilled packet, 1 … 255 ms. Short answers wait for
   /// it.

@@ -68,8 +68,8 @@ void AptController::set_faults(const AptFaults& faults) {
     stuck_at_.reset();
   } else if (faults.stuck && !stuck_at_) {
     stuck_at_ = counts_at(now);
-    lab_.set_axis_motion(options_.axis, Trajectory::standstill(
-                                            lab_.axis_position_deg(options_.axis, now), now));
+    lab_.set_axis_motion(options_.axis,
+                         Trajectory::standstill(lab_.axis_position_deg(options_.axis, now), now));
   }
   faults_ = faults;
 }
@@ -170,8 +170,8 @@ void AptController::move_to_counts(double counts, double degrees_per_s, TimePoin
 
 void AptController::stop(bool at_once, TimePoint now) {
   const double f = options_.speed_factor;
-  follow(
-      at_once ? motion_.freeze(now) : motion_.stop(acceleration_ * options_.counts_per_degree * f * f, now));
+  follow(at_once ? motion_.freeze(now)
+                 : motion_.stop(acceleration_ * options_.counts_per_degree * f * f, now));
   homing_ = false;
   tell_end_ = true;
   stopping_ = true;

@@ -44,6 +44,7 @@ class AptController final : public ByteDevice {
   std::vector<std::uint8_t> receive(std::span<const std::uint8_t> bytes) override;
   std::vector<std::uint8_t> spontaneous() override;
 
+  [[nodiscard]] const AptControllerOptions& options() const { return options_; }
   void set_faults(const AptFaults& faults);
   /// A fault in the controller, told with words as it happens and by the motion error bit until the next
   /// command.

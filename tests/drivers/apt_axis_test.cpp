@@ -1,0 +1,217 @@
+// The APT axis on a simulated controller: the conformance suite with and without a bad cable, and what is
+// APT's own.
+
+#include "drivers/usb/apt_axis.h"
+
+#include <cmath>
+#include <memory>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "sim/lab/sim_lab.h"
+#include "sim/usb/apt_controller.h"
+#include "sim/usb/sim_link.h"
+#include "tests/drivers/axis_conformance.h"
+
+namespace eigenpose {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+TimePoint soon() {
+  return std::chrono::steady_clock::now() + 20s;
+}
+
+/// What a bad cable does to the answers. No bits are turned: the protocol has no checksum of its own, it
+/// relies on that of USB. Requests get through: a move that is lost is told as one that did not start, and
+/// that is tested apart.
+const sim::CableFaults bad_cable{
+    .lost_to_host = 0.04, .cut_to_host = 0.03, .delayed_to_host = 0.1, .delay = 10ms};
+
+class AptRig final : public AxisRig {
+ public:
+  explicit AptRig(const std::string& stage, const sim::CableFaults& faults)
+      : lab_(clock_), controller_(lab_, controller_for(stage)), cable_(controller_, clock_) {
+    cable_.set_faults(faults);
+    options_.stage = apt_stage(stage);
+    options_.speed = 30.0;
+    options_.acceleration = 60.0;
+    options_.patience.poll_interval = 3ms;
+    options_.patience.start_time = 80ms;
+    options_.patience.settle_time = 80ms;
+    options_.patience.stall_time = 300ms;
+    options_.response_timeout = 40ms;
+    options_.attempts = faults.lost_to_host > 0.0 ? 8 : 4;
+    axis_ = std::make_unique<AptAxis>(options_, std::make_unique<sim::SimLink>(cable_, clock_), clock_);
+  }
+  Axis& axis() override { return *axis_; }
+  void discard_axis() override { axis_.reset(); }
+  double true_position() override {
+    return wrap(lab_.axis_position_deg(sim::LabAxis::arm_azimuth, clock_.now()), 0.0, 360.0);
+  }
+  bool truly_moving() override {
+    const TimePoint now = clock_.now();
+    return lab_.axis_position_deg(sim::LabAxis::arm_azimuth, now) !=
+           lab_.axis_position_deg(sim::LabAxis::arm_azimuth, now - 2ms);
+  }
+  void silence(bool silent) override { cable_.silence(silent); }
+  void unplug() override { cable_.unplug(); }
+  void plug_in() override { cable_.plug_in(); }
+  void jam(bool jammed) override { controller_.set_faults({.stuck = jammed}); }
+  void slip() override { controller_.set_faults({.slip_counts = controller_.options().counts_per_degree}); }
+  void raise_alarm() override { controller_.raise_fault("over temperature"); }
+
+  sim::Cable& cable() { return cable_; }
+  sim::AptController& controller() { return controller_; }
+
+ private:
+  static sim::AptControllerOptions controller_for(const std::string& stage) {
+    sim::AptControllerOptions options;
+    options.speed_factor = 30.0;
+    if (stage == "K10CR1") {
+      options.model = "K10CR1";
+      options.stepper = true;
+      options.counts_per_degree = 136533.33;
+      options.velocity_per_degree = 7329109.0;
+      options.acceleration_per_degree = 1502.0;
+    }
+    return options;
+  }
+
+  SteadyClock clock_;
+  sim::SimLab lab_;
+  sim::AptController controller_;
+  sim::Cable cable_;
+  AptAxisOptions options_;
+  std::unique_ptr<AptAxis> axis_;
+};
+
+AxisRigCase rig_case(const std::string& name, const std::string& stage, const sim::CableFaults& faults) {
+  return {name, [=] { return std::make_unique<AptRig>(stage, faults); }};
+}
+
+INSTANTIATE_TEST_SUITE_P(Apt, AxisConformance,
+                         testing::Values(rig_case("DcServo", "PRM1-Z8", {}),
+                                         rig_case("Stepper", "K10CR1", {}),
+                                         rig_case("DcServoOnABadCable", "PRM1-Z8", bad_cable)),
+                         rig_name);
+
+class AptAxisTest : public testing::Test {
+ protected:
+  AptRig rig_{"PRM1-Z8", {}};
+};
+
+TEST_F(AptAxisTest, SaysThatItIsAliveSoThatTheControllerGoesOnAnswering) {
+  for (int i = 0; i < 120; ++i)
+    rig_.axis().state(soon());  // a controller falls silent after 50 unheard updates
+  EXPECT_GE(rig_.controller().keep_alives(), 120);
+}
+
+TEST_F(AptAxisTest, SaysTheControllersOwnWords) {
+  rig_.axis().home(soon(), {});
+  rig_.controller().raise_fault("over temperature");
+  EXPECT_THAT(*rig_.axis().state(soon()).alarm, HasSubstr("over temperature"));
+}
+
+TEST_F(AptAxisTest, AMoveThatNeverReachedTheControllerIsNotCalledArrived) {
+  rig_.axis().home(soon(), {});
+  // Every message is a piece of its own; a third of them lost means that the move is lost sooner or later.
+  rig_.cable().set_faults({.lost_from_host = 0.3});
+  for (int i = 0; i < 8; ++i) {
+    const double target = i % 2 == 0 ? 20.0 : 10.0;
+    try {
+      const double reported = rig_.axis().move_to(target, soon(), {});
+      EXPECT_NEAR(rig_.true_position(), target, 0.05);
+      EXPECT_NEAR(reported, target, 0.05);
+    } catch (const DeviceError& error) {
+      EXPECT_GT(std::string(error.what()).size(), 20U);
+    }
+  }
+}
+
+TEST_F(AptAxisTest, ALostDeviceIsNamed) {
+  rig_.unplug();
+  try {
+    rig_.axis().state(soon());
+    FAIL() << "an unplugged device has answered";
+  } catch (const DeviceLost& error) {
+    EXPECT_THAT(error.what(), HasSubstr("unplugged"));
+    EXPECT_EQ(error.device(), "arm");
+  }
+}
+
+TEST(AptStage, EveryStageHasItsFigures) {
+  for (const AptStage& stage : apt_stages()) {
+    EXPECT_TRUE(stage.unit == "deg" || stage.unit == "mm") << stage.name;
+    EXPECT_GT(stage.counts_per_unit, 0.0) << stage.name;
+    EXPECT_GT(stage.velocity_per_unit, stage.counts_per_unit) << stage.name;
+    EXPECT_GT(stage.acceleration_per_unit, 0.0) << stage.name;
+    EXPECT_GT(stage.speed, 0.0) << stage.name;
+  }
+  EXPECT_THROW((void)apt_stage("PRM2"), std::invalid_argument);
+}
+
+TEST(AptStage, DcServoNumbersFollowTheControllersSamplingInterval) {
+  // The protocol's own formula, T = 2048 / 6 MHz: what the tables print agrees with it to the digits they
+  // have.
+  const double t = 2048.0 / 6e6;
+  for (const AptStage& stage : apt_stages()) {
+    if (stage.stepper) continue;
+    EXPECT_NEAR(stage.velocity_per_unit / (stage.counts_per_unit * t * 65536.0), 1.0, 1e-3) << stage.name;
+    EXPECT_NEAR(stage.acceleration_per_unit / (stage.counts_per_unit * t * t * 65536.0), 1.0, 1e-3)
+        << stage.name;
+  }
+}
+
+TEST(AptProtocol, MessagesHaveTheBytesOfTheManual) {
+  using testing::ElementsAre;
+  EXPECT_THAT(apt::short_message(apt::Message::move_home, 1, 0, 0x50),
+              ElementsAre(0x43, 0x04, 1, 0, 0x50, 1));
+  EXPECT_THAT(apt::move_absolute(1, 200000, 0x50),
+              ElementsAre(0x53, 0x04, 6, 0, 0xD0, 1, 1, 0, 0x40, 0x0D, 0x03, 0x00));
+  EXPECT_THAT(apt::move_absolute(1, -1, 0x21),
+              ElementsAre(0x53, 0x04, 6, 0, 0xA1, 1, 1, 0, 0xFF, 0xFF, 0xFF, 0xFF));
+  EXPECT_EQ(apt::set_velocity(1, 5, 6, 0x50).size(), 20U);
+}
+
+TEST(AptProtocol, MessagesAreFoundWhereverTheStreamIsCut) {
+  std::vector<std::uint8_t> stream = {0x44, 0x04, 1,  0, 0x01, 0x50,                         // homed
+                                      0x91, 0x04, 14, 0, 0x81, 0x50, 1, 0,   0x10, 0, 0, 0,  // status
+                                      0,    0,    0,  0, 0x20, 0x04, 0, 0x80};
+  for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
+    apt::Unpacker unpacker(0x50);
+    std::vector<apt::Received> messages;
+    const auto take = [&] {
+      while (auto message = unpacker.next()) messages.push_back(*message);
+    };
+    unpacker.feed(std::span(stream).first(cut));
+    take();
+    unpacker.feed(std::span(stream).subspan(cut));
+    take();
+    ASSERT_EQ(messages.size(), 2U) << "cut at " << cut;
+    EXPECT_EQ(messages[0].number, 0x0444);
+    const auto status = apt::status_of(messages[1]);
+    ASSERT_TRUE(status.has_value());
+    EXPECT_EQ(status->position, 16);
+    EXPECT_EQ(status->bits, 0x80000420U);
+  }
+}
+
+TEST(AptProtocol, BytesThatAreNoMessageAreRefused) {
+  apt::Unpacker wrong_destination(0x50);
+  wrong_destination.feed(std::vector<std::uint8_t>{0x44, 0x04, 1, 0, 0x02, 0x50});
+  EXPECT_THROW((void)wrong_destination.next(), std::runtime_error);
+  apt::Unpacker wrong_source(0x50);
+  wrong_source.feed(std::vector<std::uint8_t>{0x44, 0x04, 1, 0, 0x01, 0x11});
+  EXPECT_THROW((void)wrong_source.next(), std::runtime_error);
+  apt::Unpacker too_long(0x50);
+  too_long.feed(std::vector<std::uint8_t>{0x91, 0x04, 0, 2, 0x81, 0x50});
+  EXPECT_THROW((void)too_long.next(), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace eigenpose
