@@ -66,6 +66,22 @@ void widen(const Shape& shape, std::vector<double> piece, int axis, int level, i
 }  // namespace
 
 Range range(const Shape& shape, std::span<const double> coefficients, int levels) {
+  if (shape.axes == 1 && shape.degree[0] <= 2) {
+    // Exact: the ends, and where the derivative of a quadratic vanishes.
+    const double first = coefficients[0];
+    const double last = coefficients.back();
+    Range exact{std::min(first, last), std::max(first, last)};
+    if (shape.degree[0] == 2) {
+      const double rise = coefficients[1] - first;
+      const double fall = coefficients[1] - last;
+      if (rise * fall > 0.0) {
+        const double extreme = first + rise * rise / (rise + fall);
+        exact.low = std::min(exact.low, extreme);
+        exact.high = std::max(exact.high, extreme);
+      }
+    }
+    return exact;
+  }
   Range result{coefficients[0], coefficients[0]};
   widen(shape, {coefficients.begin(), coefficients.end()}, 0, 0, levels, result);
   return result;
@@ -87,30 +103,40 @@ double value_at(int degree, std::array<double, max_degree + 1> b, double t) {
   return b[0];
 }
 
-/// Root of p′ on a convex piece with p′(0) < 0 < p′(1).
+/// Root of p′ on a convex piece with p′(0) < 0 < p′(1): Newton's method inside a shrinking bracket.
 double convex_minimum(int degree, const std::array<double, max_degree + 1>& b) {
+  // p′ / degree in powers of t: differences of differences, times binomials.
+  std::array<double, max_degree> power;
+  for (int i = 0; i < degree; ++i) power[i] = b[i + 1] - b[i];
+  for (int order = 1; order < degree; ++order)
+    for (int i = degree - 1; i >= order; --i) power[i] -= power[i - 1];
+  double choose = 1.0;
+  for (int i = 0; i < degree; ++i) {
+    power[i] *= choose;
+    choose *= static_cast<double>(degree - 1 - i) / (i + 1);
+  }
   double low = 0.0;
   double high = 1.0;
   const double slope0 = b[1] - b[0];
   const double slope1 = b[degree] - b[degree - 1];
   double t = slope0 / (slope0 - slope1);
   for (int iteration = 0; iteration < 60; ++iteration) {
-    // First and second derivative, up to the factor `degree`, by de Casteljau on the differences.
-    std::array<double, max_degree + 1> d;
-    for (int i = 0; i < degree; ++i) d[i] = b[i + 1] - b[i];
-    for (int level = degree - 1; level > 1; --level)
-      for (int i = 0; i < level; ++i) d[i] += t * (d[i + 1] - d[i]);
-    const double first = degree > 1 ? d[0] + t * (d[1] - d[0]) : d[0];
-    const double second = degree > 1 ? (degree - 1) * (d[1] - d[0]) : 0.0;
+    double first = power[degree - 1];
+    double second = 0.0;
+    for (int i = degree - 2; i >= 0; --i) {
+      second = second * t + first;
+      first = first * t + power[i];
+    }
     if (first > 0.0)
       high = t;
     else
       low = t;
     double next = second > 0.0 ? t - first / second : 0.5 * (low + high);
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (!(next >= low && next <= high)) next = 0.5 * (low + high);
     const double step = std::abs(next - t);
     t = next;
-    if (step < 1e-14) break;
+    // Steps shrink quadratically: the next one is below rounding.
+    if (step < 1e-9) break;
   }
   return t;
 }

@@ -67,7 +67,7 @@ QueryMemory& query_memory();
 QueryMemory& begin_query(const Eigen::Ref<const Eigen::VectorXf>& point, std::size_t dimensions,
                          std::size_t count);
 
-/// Turns places into answers, distances computed from f itself.
+/// Turns places into answers; small distances are computed from f itself.
 std::size_t finish_query(const PatchSet& patches, const BestList& best, const double* point,
                          std::span<ClosestPoint> results);
 

@@ -6,12 +6,13 @@
 namespace eigenpose {
 
 std::uint32_t box_kernel_avx2(const BoxSlice* slices, const float* point, std::size_t dimensions, float bound,
-                              BoxDistances& distances);
+                              bool ordered, BoxDistances& distances);
 
 namespace {
 
 struct Sse2 {
   using Vector = __m128;
+  static Vector all(float value) { return _mm_set1_ps(value); }
   static Vector larger(Vector a, Vector b) { return _mm_max_ps(a, b); }
   static std::uint32_t within(Vector a, Vector bound) {
     return static_cast<std::uint32_t>(_mm_movemask_ps(_mm_cmple_ps(a, bound)));
@@ -19,8 +20,9 @@ struct Sse2 {
 };
 
 std::uint32_t box_kernel_baseline(const BoxSlice* slices, const float* point, std::size_t dimensions,
-                                  float bound, BoxDistances& distances) {
-  return BoxBody<Sse2>::run(slices, point, dimensions, bound, distances);
+                                  float bound, bool ordered, BoxDistances& distances) {
+  return ordered ? BoxBody<Sse2>::run<true>(slices, point, dimensions, bound, distances)
+                 : BoxBody<Sse2>::run<false>(slices, point, dimensions, bound, distances);
 }
 
 }  // namespace

@@ -21,14 +21,15 @@ struct alignas(64) BoxDistances {
   /// Squared distance from the point to the box, from below up to float rounding; where it exceeds the bound
   /// it may stop growing early.
   float squared[box_lanes];
-  /// Squared distance to the box plus a little of that to its centre: the order to look at them in.
+  /// Squared distance to the box plus a little of that to its centre: the order to look at them in. Only if
+  /// asked for.
   float order[box_lanes];
 };
 
-/// @param slices one per dimension. @param point as many floats.
+/// @param slices one per dimension. @param point as many floats. @param ordered whether `order` is wanted.
 /// @returns a bit per box: set where the squared distance is at most `bound`. If none is, the loop ends
 /// early.
 using BoxKernel = std::uint32_t (*)(const BoxSlice* slices, const float* point, std::size_t dimensions,
-                                    float bound, BoxDistances& distances);
+                                    float bound, bool ordered, BoxDistances& distances);
 
 }  // namespace eigenpose

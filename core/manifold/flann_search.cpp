@@ -77,6 +77,8 @@ std::size_t FlannSearch::nearest_into(const Eigen::Ref<const Eigen::VectorXf>& p
   const flann::SearchParams parameters(flann::FLANN_CHECKS_UNLIMITED, 0.0F);
   SampleMemory& samples = sample_memory();
   NearestSample nearest;
+  const double farthest = bound + impl_->cloud.largest_reach();
+  nearest.squared = static_cast<float>(farthest * farthest);
   impl_->index.findNeighbors(nearest, point.data(), parameters);
   // Its distance bounds that of the manifold; the certificate asks for what lies up to a reach beyond.
   const double start = std::min(std::sqrt(static_cast<double>(nearest.squared)), bound);

@@ -1,11 +1,13 @@
 #include "core/manifold/search.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include "core/manifold/best_list.h"
 #include "core/manifold/exhaustive_search.h"
 #include "core/manifold/flann_search.h"
+#include "core/manifold/slab_search.h"
 #include "core/manifold/tree_search.h"
 
 namespace eigenpose {
@@ -27,6 +29,7 @@ std::unique_ptr<ManifoldSearch> make_search(std::string_view kind, std::span<con
   if (kind == "tree") return std::make_unique<TreeSearch>(manifolds);
   if (kind == "exhaustive") return std::make_unique<ExhaustiveSearch>(manifolds);
   if (kind == "flann") return std::make_unique<FlannSearch>(manifolds);
+  if (kind == "slab") return std::make_unique<SlabSearch>(manifolds);
   throw std::invalid_argument("unknown search \"" + std::string(kind) +
                               "\": tree, exhaustive, flann or slab");
 }
@@ -56,8 +59,11 @@ QueryMemory& begin_query(const Eigen::Ref<const Eigen::VectorXf>& point, std::si
 std::size_t finish_query(const PatchSet& patches, const BestList& best, const double* point,
                          std::span<ClosestPoint> results) {
   const std::span<const PatchPoint> found = best.found();
+  // Rounding of a squared distance is about 1e-15: below 1e-8 its root would not be good to 1e-9.
   for (std::size_t i = 0; i < found.size(); ++i)
-    results[i] = {found[i].manifold, patches.position(found[i]), patches.distance(found[i], point)};
+    results[i] = {found[i].manifold, patches.position(found[i]),
+                  found[i].squared_distance > 1e-8 ? std::sqrt(found[i].squared_distance)
+                                                   : patches.distance(found[i], point)};
   return found.size();
 }
 

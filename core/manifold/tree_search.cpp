@@ -162,8 +162,10 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best,
     const Node node = nodes_[entry.node];
     BoxDistances distances;
     const std::uint32_t used = node.count == box_lanes ? 0xFFFFU : (1U << node.count) - 1U;
+    const bool inner = entry.node < first_leaf_;
     const std::uint32_t mask =
-        kernel_(slices_.data() + entry.node * dims, point, dims, within, distances) & used;
+        kernel_(slices_.data() + entry.node * dims, point, dims, within, inner, distances) & used;
+    const float* order = inner ? distances.order : distances.squared;
     if constexpr (Certify) {
       ++certificate->nodes;
       for (std::uint32_t out = used & ~mask; out != 0; out &= out - 1)
@@ -174,11 +176,10 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best,
     for (std::uint32_t in = mask; in != 0; in &= in - 1) {
       const auto lane = static_cast<std::uint8_t>(std::countr_zero(in));
       std::size_t at = count++;
-      for (; at > 0 && distances.order[lanes[at - 1]] > distances.order[lane]; --at)
-        lanes[at] = lanes[at - 1];
+      for (; at > 0 && order[lanes[at - 1]] > order[lane]; --at) lanes[at] = lanes[at - 1];
       lanes[at] = lane;
     }
-    if (entry.node < first_leaf_) {
+    if (inner) {
       for (std::size_t i = count; i-- > 0;)
         stack[waiting++] = {distances.squared[lanes[i]], node.first + lanes[i]};
       continue;

@@ -1,0 +1,152 @@
+// Every search against the oracle, on many queries.
+//
+//   search_stress [queries] [threads]     (10 million, all cores)
+//
+// Lists of a few manifolds with random K, samples, degrees, closed and open, uniform and jittered, twins
+// among them; queries near, far, on knots, at seams and between two manifolds. One list in 500 has two DOFs.
+// With EIGENPOSE_DATASETS set, 1 % of the queries are real views of COIL-100, moved a little at random. Ends
+// with status 1 where a search differs from the oracle by more than 1e-5, or names another manifold although
+// the difference is clear.
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <mutex>
+#include <random>
+
+#include "core/base/parallel.h"
+#include "core/manifold/search.h"
+#include "tests/bench/search_worlds.h"
+#include "tests/core/manifold/search_queries.h"
+#include "tests/core/manifold/synthetic.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr double promised = 1e-5;
+constexpr std::size_t queries_per_list = 5000;
+constexpr std::size_t queries_per_patch_list = 20;
+const char* const kinds[] = {"tree", "flann", "slab"};
+
+struct Tally {
+  std::mutex mutex;
+  std::atomic<std::size_t> queries{0};
+  std::size_t wrong[3] = {0, 0, 0};
+  double worst[3] = {0.0, 0.0, 0.0};
+};
+
+std::vector<Manifold> random_list(std::size_t dofs, std::mt19937& random) {
+  const auto number = [&](int low, int high) {
+    return std::uniform_int_distribution<int>(low, high)(random);
+  };
+  const Eigen::Index dimensions = number(2, 24);
+  std::vector<Manifold> list;
+  for (int i = number(2, 5); i > 0; --i) {
+    std::vector<SampleAxis> axes = {
+        synthetic::axis("a", number(4, 16), number(0, 3) != 0, number(0, 1) == 1, random)};
+    if (dofs == 2) axes.push_back(synthetic::axis("b", number(2, 5), false, number(0, 1) == 1, random));
+    list.push_back(synthetic::smooth_manifold(axes, dimensions, 2, random, number(1, 4)));
+  }
+  if (number(0, 3) == 0) list.push_back(Manifold(list[0]));
+  return list;
+}
+
+/// One oracle and the searches over one list.
+class Comparison {
+ public:
+  Comparison(std::span<const Manifold> list, Tally& tally)
+      : tally_(tally), oracle_(make_search("exhaustive", list)) {
+    for (const char* kind : kinds) searches_.push_back(make_search(kind, list));
+  }
+  ~Comparison() {
+    const std::lock_guard lock(tally_.mutex);
+    for (std::size_t k = 0; k < 3; ++k) {
+      tally_.wrong[k] += wrong_[k];
+      tally_.worst[k] = std::max(tally_.worst[k], worst_[k]);
+    }
+  }
+  void ask(const Eigen::VectorXf& point, double bound) {
+    ClosestPoint truth[2];
+    const std::size_t expected = oracle_->nearest_into(point, truth, bound);
+    for (std::size_t k = 0; k < searches_.size(); ++k) {
+      ClosestPoint found;
+      const std::size_t count = searches_[k]->nearest_into(point, {&found, 1}, bound);
+      // On the bound itself either answer is right.
+      if (count != std::min<std::size_t>(expected, 1)) {
+        const double edge = expected > 0 ? truth[0].distance : found.distance;
+        if (std::abs(edge - bound) > promised) ++wrong_[k];
+        continue;
+      }
+      if (count == 0) continue;
+      const double difference = std::abs(found.distance - truth[0].distance);
+      worst_[k] = std::max(worst_[k], difference);
+      const bool clear = expected < 2 || truth[1].distance - truth[0].distance > 2.0 * promised;
+      if (difference > promised || (clear && found.manifold != truth[0].manifold)) ++wrong_[k];
+    }
+    ++tally_.queries;
+  }
+
+ private:
+  Tally& tally_;
+  std::unique_ptr<ManifoldSearch> oracle_;
+  std::vector<std::unique_ptr<ManifoldSearch>> searches_;
+  std::size_t wrong_[3] = {0, 0, 0};
+  double worst_[3] = {0.0, 0.0, 0.0};
+};
+
+double random_bound(std::mt19937& random) {
+  const int which = std::uniform_int_distribution<int>(0, 3)(random);
+  return which == 0 ? 0.1 : which == 1 ? 0.5 : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+}  // namespace eigenpose
+
+int main(int count, char** arguments) {
+  using namespace eigenpose;
+  const std::size_t wanted = count > 1 ? std::strtoul(arguments[1], nullptr, 10) : 10'000'000;
+  const auto threads = static_cast<unsigned>(count > 2 ? std::strtoul(arguments[2], nullptr, 10) : 0);
+  Tally tally;
+  const char* datasets = std::getenv("EIGENPOSE_DATASETS");
+  if (datasets != nullptr && *datasets != '\0') {
+    const std::size_t real = wanted / 100;
+    const bench::SearchWorld world = bench::coil_world(std::filesystem::path(datasets) / "coil-100-half", 40,
+                                                       std::max<std::size_t>(real / 3, 1));
+    parallel_for(3, threads, [&](std::size_t part) {
+      std::mt19937 random(static_cast<unsigned>(part));
+      std::normal_distribution<float> normal(0.0F, 0.003F);
+      Comparison comparison(world.manifolds, tally);
+      for (Eigen::VectorXf point : part == 0 ? world.known : part == 1 ? world.perturbed : world.unknown) {
+        for (float& x : point) x += normal(random);
+        comparison.ask(point, part == 2 ? world.rejection_distance : random_bound(random));
+      }
+    });
+    std::printf("real views done: %zu queries\n", tally.queries.load());
+  } else {
+    std::printf("EIGENPOSE_DATASETS is not set: no real views among the queries\n");
+  }
+  const std::size_t lists =
+      (wanted - std::min(wanted, tally.queries.load()) + queries_per_list - 1) / queries_per_list;
+  parallel_for(lists, threads, [&](std::size_t i) {
+    std::mt19937 random(static_cast<unsigned>(1000 + i));
+    const auto curves = random_list(1, random);
+    Comparison on_curves(curves, tally);
+    for (std::size_t k = 0; k < queries_per_list; ++k)
+      on_curves.ask(synthetic::random_query(curves, random).point, random_bound(random));
+    if (i % 500 != 0) return;
+    const auto patches = random_list(2, random);
+    Comparison on_patches(patches, tally);
+    for (std::size_t k = 0; k < queries_per_patch_list; ++k)
+      on_patches.ask(synthetic::random_query(patches, random).point, random_bound(random));
+  });
+  std::size_t wrong = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::printf("%-6s %zu queries, %zu different from the oracle, largest difference of distance %.2e\n",
+                kinds[k], tally.queries.load(), tally.wrong[k], tally.worst[k]);
+    wrong += tally.wrong[k];
+  }
+  return wrong == 0 ? 0 : 1;
+}
