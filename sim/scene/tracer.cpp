@@ -15,9 +15,10 @@ namespace {
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr float lamp_strength = 1.12F;     // puts a white sheet on the table near full scale
 constexpr float clear_of_surface = 0.25F;  // mm a shadow ray starts above its surface
-constexpr Vec3 felt{0.0042F, 0.0042F, 0.0046F};
+// Black velvet, as labs lay under their objects: what stands out of it is an object.
+constexpr Vec3 felt{0.0029F, 0.0029F, 0.0031F};
 constexpr Vec3 backdrop{0.0030F, 0.0030F, 0.0032F};
-constexpr Vec3 rim{0.0068F, 0.0068F, 0.0072F};
+constexpr Vec3 rim{0.0036F, 0.0036F, 0.0038F};
 
 float radians_of(float degrees_value) {
   return degrees_value * pi / 180.0F;
@@ -208,7 +209,7 @@ StagePoint stage_point(Vec3 camera, Vec3 direction) {
     if (r > edge - 2.5F) return {top, up, rim};
     // Fine rings help to centre an object.
     const bool ring = std::abs(std::remainder(r, 25.0F)) < 0.35F && r > 12.0F;
-    return {top, up, ring ? 1.35F * felt : felt};
+    return {top, up, ring ? 1.15F * felt : felt};
   }
   // The table's side, or past it the backdrop below.
   const float a = direction.x * direction.x + direction.y * direction.y;
