@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/image/image_set.h"
+#include "core/recognition/learning.h"
 #include "daemon/acquisition.h"
 #include "daemon/api/errors.h"
 
@@ -17,6 +18,31 @@ namespace eigenpose {
 namespace {
 
 constexpr int jpeg_quality = 85;
+
+/// The complete image sets, or those that are named.
+std::vector<ImageSet> learning_sets(const std::filesystem::path& folder,
+                                    const std::vector<std::string>& wanted) {
+  std::vector<ImageSet> sets;
+  std::size_t named = 0;
+  for (ImageSet& set : open_image_sets(folder)) {
+    const bool is_named = std::find(wanted.begin(), wanted.end(), set.object()) != wanted.end();
+    named += is_named ? 1 : 0;
+    if (!wanted.empty() && !is_named) continue;
+    if (set.complete())
+      sets.push_back(std::move(set));
+    else if (is_named)
+      throw RequestError(409, "the image set of \"" + set.object() + "\" is incomplete",
+                         "acquire it again: it continues where it was");
+    else
+      spdlog::warn("event=set_left_out object={} reason=incomplete", set.object());
+  }
+  if (named < wanted.size())
+    throw RequestError(404, "an object that was named has no image set", "GET /v1/objects lists them");
+  if (sets.empty())
+    throw RequestError(409, "no image set is complete yet",
+                       "acquire an object first: eigenpose acquire NAME");
+  return sets;
+}
 
 }  // namespace
 
@@ -27,7 +53,10 @@ Service::Service(Config config, Devices devices, const Clock& clock)
       models_(config_.model_file()),
       results_(std::make_shared<EventLog>(static_cast<std::size_t>(config_.api.event_buffer))),
       rig_(std::move(devices_.axes), std::move(devices_.lamps), clock),
-      camera_(std::move(devices_.camera), clock) {}
+      camera_(std::move(devices_.camera), clock),
+      watcher_(config_.watch, camera_, models_, *results_) {
+  models_.load();
+}
 
 Service::~Service() = default;
 
@@ -35,6 +64,7 @@ JobStatus Service::acquire(const std::string& object, const Plan& plan) {
   check_plan(plan, config_.dofs());
   AcquisitionRequest request{object, plan, plan_workspace(plan, config_.dofs()), config_.image_sets()};
   return jobs_.start("acquire", object, [this, request = std::move(request)](const Jobs::Context& job) {
+    const Watcher::Pause pause(watcher_);
     AcquisitionReport report;
     try {
       eigenpose::acquire(request, rig_, camera_, clock_, report, job.progress, job.stop);
@@ -45,6 +75,33 @@ JobStatus Service::acquire(const std::string& object, const Plan& plan) {
       throw;
     }
     return nlohmann::json{{"folder", report.folder.string()}, {"views", report.total}, {"kept", report.kept}}
+        .dump();
+  });
+}
+
+JobStatus Service::learn(const LearnRequest& request) {
+  LearningOptions options;
+  options.normalization.size = config_.learn.size;
+  options.normalization.color = config_.learn.color;
+  options.solver.components = static_cast<std::size_t>(request.components.value_or(config_.learn.components));
+  options.solver.energy = config_.learn.energy;
+  options.image_sets = config_.image_sets().string();
+  options.program_version = EIGENPOSE_VERSION;
+  return jobs_.start("learn", "", [this, options, wanted = request.objects](const Jobs::Context& job) {
+    const std::vector<ImageSet> sets = learning_sets(config_.image_sets(), wanted);
+    LearningReport report;
+    const auto model = std::make_shared<const Model>(
+        eigenpose::learn(all_views(sets), options, &report, job.progress, job.stop));
+    models_.replace(model);
+    spdlog::info("event=model_learned objects={} views={} components={} energy={:.4f} seconds={:.2f}",
+                 model->objects.size(), report.views, report.solver.components, report.solver.energy,
+                 std::chrono::duration<double>(report.total_time).count());
+    return nlohmann::json{{"objects", model->objects.size()},
+                          {"views", report.views},
+                          {"components", report.solver.components},
+                          {"energy", report.solver.energy},
+                          {"seconds", std::chrono::duration<double>(report.total_time).count()},
+                          {"file", models_.file().string()}}
         .dump();
   });
 }

@@ -17,6 +17,7 @@
 #include "daemon/jobs.h"
 #include "daemon/model_store.h"
 #include "daemon/rig.h"
+#include "daemon/watcher.h"
 
 namespace eigenpose {
 
@@ -35,7 +36,7 @@ struct ObjectStatus {
 /// Learning's own settings, each taken from the configuration unless given.
 struct LearnRequest {
   std::optional<int> components;
-  std::vector<std::string> objects;  ///< empty: all that are acquired
+  std::vector<std::string> objects;  ///< empty: all whose image set is complete
 };
 
 /// The running service. Construction starts it in the order of the members; destruction stops it in reverse:
@@ -52,6 +53,9 @@ class Service {
   /// Starts an acquisition. @throws RequestError (409 running or complete already, 400 bad name),
   /// ConfigError.
   JobStatus acquire(const std::string& object, const Plan& plan);
+  /// Starts learning all complete image sets; the model is saved, then swapped in. @throws RequestError (409
+  /// running).
+  JobStatus learn(const LearnRequest& request);
   /// The configured plan of that name. @throws RequestError (404).
   [[nodiscard]] const Plan& plan(const std::string& name) const;
 
@@ -67,6 +71,7 @@ class Service {
   [[nodiscard]] const ModelStore& models() const { return models_; }
   [[nodiscard]] const FrameHub& camera() const { return camera_; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
+  [[nodiscard]] const Watcher& watcher() const { return watcher_; }
   [[nodiscard]] const std::shared_ptr<EventLog>& results() const { return results_; }
   [[nodiscard]] Jobs& jobs() { return jobs_; }
 
@@ -79,6 +84,7 @@ class Service {
   std::shared_ptr<EventLog> results_;
   Rig rig_;
   FrameHub camera_;
+  Watcher watcher_;
   Jobs jobs_;
 };
 

@@ -102,6 +102,7 @@ json status_json(Service& service) {
   for (const Plan& plan : service.config().plans)
     plans.push_back({{"name", plan.name}, {"views", plan.size()}});
 
+  const WatchStatus watched = service.watcher().status();
   json model = nullptr;
   if (const auto current = service.models().current()) {
     std::size_t views = 0;
@@ -126,6 +127,10 @@ json status_json(Service& service) {
           {"plans", std::move(plans)},
           {"model", std::move(model)},
           {"model_error", or_null(service.models().error())},
+          {"watch",
+           {{"frames", watched.frames},
+            {"recognitions", watched.recognitions},
+            {"error", or_null(watched.error)}}},
           {"last_result", service.results()->last_sequence()},
           {"jobs", std::move(running)},
           {"sim", std::move(simulation)}};

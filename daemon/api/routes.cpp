@@ -131,6 +131,18 @@ Answer post_acquisition(Service& service, const Request& request, const std::str
       object, plan.is_string() ? service.plan(plan.get<std::string>()) : plan_from(plan, service)));
 }
 
+Answer post_learn(Service& service, const Request& request, const std::string&) {
+  const json body = body_object(request, {"components", "objects"});
+  LearnRequest learn;
+  if (body.contains("components")) {
+    learn.components = body.at("components").get<int>();
+    if (*learn.components < 1 || *learn.components > 1024)
+      throw RequestError(400, fmt::format("components is {}", *learn.components), "allowed: 1 to 1024");
+  }
+  if (body.contains("objects")) learn.objects = body.at("objects").get<std::vector<std::string>>();
+  return started(service.learn(learn));
+}
+
 /// Everything the API offers.
 constexpr Route routes[] = {
     {"GET", "/v1/status", Access::read, get_status},
@@ -144,6 +156,7 @@ constexpr Route routes[] = {
     {"POST", "/v1/acquisitions", Access::control, post_acquisition},
     {"GET", "/v1/acquisitions/{id}", Access::read, get_job},
     {"DELETE", "/v1/acquisitions/{id}", Access::control, cancel_job},
+    {"POST", "/v1/learn", Access::control, post_learn},
 };
 
 /// Whether `path` is what the route's path stands for; fills `id`.

@@ -12,6 +12,7 @@
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 #include "daemon/cli/learning_options.h"
+#include "daemon/cli/service_client.h"
 
 namespace eigenpose::cli {
 namespace {
@@ -21,6 +22,7 @@ Examples:
   eigenpose learn sets/coil-20 --to coil-20.model --size 128
   eigenpose learn sets/lab --to lab.model --energy 0.95 --components 60
   eigenpose learn sets/lab --to lab.model --objects mug,duck
+  eigenpose learn                              the running service learns what it has acquired and watches with it
 
 The model is written at once when all is learned; a former model of that name stays until then.)";
 
@@ -28,6 +30,7 @@ struct Options {
   std::string sets;
   std::string to;
   LearningArguments learning;
+  ServiceOptions service;
 };
 
 double seconds(Duration duration) {
@@ -57,7 +60,13 @@ void print(const Model& model, const LearningReport& report, const std::string& 
   std::printf("model: %s\n", file.c_str());
 }
 
-int run(const Options& options, const std::stop_token& stop) {
+int run(const Options& options, const CLI::App& command, const std::stop_token& stop) {
+  if (options.sets.empty()) {
+    const int components =
+        command.count("--components") > 0 ? static_cast<int>(options.learning.components) : 0;
+    return learn_at_service(options.service, components, stop);
+  }
+  if (options.to.empty()) throw Error("the model needs a name: add --to FILE");
   const auto sets = open_chosen_sets(options.sets, options.learning);
   const LearningOptions learning = learning_options(options.learning, sets, options.sets);
   ConsoleProgress progress;
@@ -75,11 +84,14 @@ void add_learn_command(CLI::App& app, CommandLine& line) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("learn", "Learn a model from image sets");
   command->footer(examples);
-  command->add_option("sets", options->sets, "Folder of image sets")->required();
-  command->add_option("--to", options->to, "The model file to write")->required();
+  command->add_option("sets", options->sets,
+                      "Folder of image sets; without it the running service learns what it has acquired");
+  command->add_option("--to", options->to, "The model file to write");
   add_learning_options(*command, options->learning);
-  command->callback(
-      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+  add_service_options(*command, options->service);
+  command->callback([options, command, &line] {
+    line.action = [options, command, &line] { return run(*options, *command, line.stop); };
+  });
 }
 
 }  // namespace eigenpose::cli
