@@ -3,49 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include <Eigen/Cholesky>
 
-#include "core/base/parallel.h"
-#include "core/subspace/kernels.h"
+#include "core/subspace/tile_products.h"
 #include "core/subspace/view_reader.h"
 #include "core/subspace/work_meter.h"
 
 namespace eigenpose {
 namespace {
 
-constexpr std::size_t kPixels = 128;  ///< pixels that one job works on; a multiple of 8
-constexpr std::size_t kDepth = 32;  ///< views packed at once; strips of a streamed source are multiples of it
-
 constexpr double kSignTolerance = 1e-4;  ///< share of the largest entry: see Eigenspace's invariants
-
-/// out += X · weights for the views of `block`, whose first one has row `first` of `weights`.
-void add_block(const ViewBlock& block, const Eigen::MatrixXd& weights, std::size_t first, unsigned threads,
-               Eigen::MatrixXd& out) {
-  const Kernels& kernels = best_kernels();
-  const auto rows = static_cast<std::size_t>(weights.cols());
-  const auto stride = static_cast<std::size_t>(weights.rows());
-  parallel_for((block.length + kPixels - 1) / kPixels, threads, [&](std::size_t job) {
-    const std::size_t pixel = job * kPixels;
-    const std::size_t n = std::min(kPixels, block.length - pixel);
-    std::vector<double> packed(kDepth * kPixels, 0.0);
-    std::vector<double> sums(rows * kPixels, 0.0);
-    // The running sums continue, so that strips do not show in the result.
-    for (std::size_t r = 0; r < rows; ++r) {
-      std::copy_n(out.data() + r * block.length + pixel, n, sums.data() + r * kPixels);
-    }
-    for (std::size_t view = 0; view < block.count; view += kDepth) {
-      const std::size_t depth = std::min(kDepth, block.count - view);
-      for (std::size_t v = 0; v < depth; ++v) block.widen(view + v, pixel, n, packed.data() + v * kPixels);
-      kernels.combine(weights.data() + first + view, stride, rows, packed.data(), kPixels, depth, kPixels,
-                      sums.data(), kPixels);
-    }
-    for (std::size_t r = 0; r < rows; ++r) {
-      std::copy_n(sums.data() + r * kPixels, n, out.data() + r * block.length + pixel);
-    }
-  });
-}
 
 }  // namespace
 
@@ -56,13 +24,13 @@ Eigen::MatrixXd back_project(const AppearanceSource& source, const Eigen::Vector
   const Eigen::MatrixXd scaled = norms.cwiseInverse().asDiagonal() * weights;
   ViewReader reader(source);
   std::size_t strip = reader.views_in(options.tile_memory);
-  if (!reader.resident() && strip > kDepth) strip -= strip % kDepth;
-  if (reader.resident()) strip = 16 * kDepth;  // only to hear of stop requests now and then
+  if (!reader.resident() && strip > kViewDepth) strip -= strip % kViewDepth;
+  if (reader.resident()) strip = 16 * kViewDepth;  // only to hear of stop requests now and then
   WorkMeter meter(progress, std::move(stop), "back-projection", count);
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(source.length()), weights.cols());
   for (std::size_t first = 0; first < count; first += strip) {
     const std::size_t n = std::min(strip, count - first);
-    add_block(reader.read(first, n), scaled, first, options.threads, out);
+    add_weighted_views(reader.read(first, n), scaled, first, options.threads, out);
     meter.finished(n);
   }
   return out;

@@ -165,9 +165,9 @@ Index largest_cluster(const VectorXd& values, Index count, double noise) {
   return longest;
 }
 
-KrylovResult assess(const KrylovBasis& basis, const KrylovOptions& options, const VectorXd& values,
-                    const MatrixXd& coefficients) {
-  KrylovResult result;
+EigenPairs assess(const KrylovBasis& basis, const KrylovOptions& options, const VectorXd& values,
+                  const MatrixXd& coefficients) {
+  EigenPairs result;
   Index rank = 0;
   while (rank < std::min(options.wanted, values.size()) && values[rank] > options.noise) ++rank;
   const Index checked = std::min(rank + 1, values.size());
@@ -176,30 +176,29 @@ KrylovResult assess(const KrylovBasis& basis, const KrylovOptions& options, cons
       basis.images(coefficients.leftCols(checked)) - vectors * values.head(checked).asDiagonal();
   result.values = values.head(rank);
   result.vectors = vectors.leftCols(rank);
-  result.products = basis.products();
-  if (rank == 0) return result;
-
-  const bool next_known = checked > rank;
-  result.next_value = next_known ? std::max(values[rank], 0.0) : 0.0;
-  const double next_residual = next_known ? residuals.col(rank).norm() : 0.0;
   result.residuals = residuals.leftCols(rank).colwise().norm();
-  const double residual = result.residuals.norm();
-  const double gap = values[rank - 1] - result.next_value;
-  const bool tied = gap <= kEqualEigenvalues * values[0];
-  result.residual_over_gap = residual / (tied ? values[rank - 1] : gap);
+  result.products = basis.products();
+  if (checked > rank) {
+    result.next_value = std::max(values[rank], 0.0);
+    result.next_residual = residuals.col(rank).norm();
+  }
+  result.converged = basis.complete();
+  if (rank == 0 || result.converged) return result;
+
   // Rounding leaves residuals of this size however long one iterates.
   const double floor = 16.0 * kEpsilon * std::sqrt(static_cast<double>(basis.used())) * values[0];
   // A next value that is still rising would overstate the gap.
-  const bool gap_settled = tied || next_residual <= std::max(0.2 * gap, floor);
-  result.converged = basis.complete() ||
-                     (gap_settled && (result.residual_over_gap <= options.tolerance || residual <= floor));
+  const double gap = values[rank - 1] - result.next_value;
+  const bool gap_settled = tied_cut(result, rank) || result.next_residual <= std::max(0.2 * gap, floor);
+  result.converged = gap_settled && (residual_over_gap(result, rank) <= options.tolerance ||
+                                     result.residuals.norm() <= floor);
   return result;
 }
 
 }  // namespace
 
-KrylovResult leading_eigenpairs(Index size, const SymmetricProduct& product, const KrylovOptions& given,
-                                std::stop_token stop) {
+EigenPairs leading_eigenpairs(Index size, const SymmetricProduct& product, const KrylovOptions& given,
+                              std::stop_token stop) {
   KrylovOptions options = given;
   options.wanted = std::min(options.wanted, size);
   options.block = std::clamp<Index>(options.block, 1, size);
@@ -216,7 +215,7 @@ KrylovResult leading_eigenpairs(Index size, const SymmetricProduct& product, con
     const bool full = basis.full(options.block);
     if (full || basis.complete() || basis.used() >= next_check || basis.products() >= options.max_products) {
       basis.ritz(values, coefficients);
-      KrylovResult result = assess(basis, options, values, coefficients);
+      EigenPairs result = assess(basis, options, values, coefficients);
       const bool spent = basis.products() >= options.max_products;
       const bool may_miss = !basis.complete() &&
                             largest_cluster(values, std::min(options.wanted + 1, values.size()),

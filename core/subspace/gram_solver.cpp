@@ -36,7 +36,9 @@ SymmetricProduct matrix_product(const Eigen::MatrixXd& matrix, unsigned threads)
   };
 }
 
-EigenPairs leading_pairs(const Eigen::MatrixXd& gram, const SolverTask& task) {
+}  // namespace
+
+EigenPairs leading_gram_pairs(const Eigen::MatrixXd& gram, const SolverTask& task) {
   const Eigen::Index size = gram.rows();
   const auto wanted = static_cast<Eigen::Index>(task.options.components);
   const double noise = rounding_of_scatter(static_cast<std::size_t>(size));
@@ -45,17 +47,12 @@ EigenPairs leading_pairs(const Eigen::MatrixXd& gram, const SolverTask& task) {
     krylov.wanted = wanted;
     krylov.noise = noise;
     krylov.max_vectors = kKrylovVectors;
-    KrylovResult found =
+    EigenPairs found =
         leading_eigenpairs(size, matrix_product(gram, task.options.threads), krylov, task.stop);
-    if (found.converged) {
-      return {std::move(found.values), std::move(found.vectors), std::move(found.residuals),
-              found.next_value};
-    }
+    if (found.converged) return found;
   }
   return full_eigenpairs(gram, wanted, noise);
 }
-
-}  // namespace
 
 std::size_t gram_solver_memory(std::size_t count, std::size_t length, std::size_t components) {
   const std::size_t solving = 8 * count * count + 16 * count * std::min<std::size_t>(count, kKrylovVectors);
@@ -77,23 +74,31 @@ Eigenspace solve_gram(const SolverTask& task, SolverReport& report) {
   const TimePoint start = clock.now();
   const GramOptions gram_options{options.threads, tiles, nullptr};
   Eigen::MatrixXd gram = gram_matrix(source, gram_options, task.progress, task.stop);
+  const Duration gram_time = clock.now() - start;
+  Eigenspace space = solve_products(std::move(gram), tiles, task, report);
+  report.gram_time = gram_time;
+  return space;
+}
+
+Eigenspace solve_products(Eigen::MatrixXd gram, std::size_t tile_memory, const SolverTask& task,
+                          SolverReport& report) {
+  const AppearanceSource& source = task.source;
+  const SolverOptions& options = task.options;
+  const SteadyClock clock;
+  const TimePoint start = clock.now();
   const Eigen::VectorXd norms = view_norms(gram, source.has_bytes());
   const double total = normalize_and_center(gram, norms, options.threads);
-  const TimePoint solving = clock.now();
-
-  EigenPairs pairs = leading_pairs(gram, task);
+  const EigenPairs pairs = leading_gram_pairs(gram, task);
   gram.resize(0, 0);
   check_rank(pairs.values.size());
   const Eigen::Index kept = components_for(pairs.values, total, options);
   judge(pairs, kept, report);
   const TimePoint projecting = clock.now();
-
   Eigenspace space =
       eigenspace_from_gram(source, norms, pairs.values.head(kept), pairs.vectors.leftCols(kept), total,
-                           {options.threads, tiles}, task.progress, task.stop);
+                           {options.threads, tile_memory}, task.progress, task.stop);
   report.exact_integers = source.has_bytes();
-  report.gram_time = solving - start;
-  report.solve_time = projecting - solving;
+  report.solve_time = projecting - start;
   report.back_projection_time = clock.now() - projecting;
   return space;
 }

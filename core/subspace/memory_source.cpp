@@ -7,7 +7,6 @@
 #include <utility>
 
 namespace eigenpose {
-namespace {
 
 AppearanceShape checked_shape(std::optional<AppearanceShape> shape, std::size_t length) {
   if (length == 0) throw std::invalid_argument("an appearance has 0 numbers: give views of at least one");
@@ -25,8 +24,6 @@ void check_columns(std::size_t first, std::size_t n, std::size_t count) {
                                 " were asked for, there are " + std::to_string(count));
   }
 }
-
-}  // namespace
 
 void AppearanceSource::read_bytes(std::size_t, std::size_t, std::uint8_t*) const {
   throw std::invalid_argument("this source has no 8-bit views: ask has_bytes() first, or call read()");

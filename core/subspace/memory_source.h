@@ -58,4 +58,11 @@ class FloatSource final : public AppearanceSource {
 /// @param first number of the first view, for the error text. @throws std::invalid_argument for a black view.
 void bytes_to_unit_columns(const std::uint8_t* bytes, std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile);
 
+/// `shape`, or one row of `length`. @throws std::invalid_argument when `length` is 0 or the shape has
+/// another.
+AppearanceShape checked_shape(std::optional<AppearanceShape> shape, std::size_t length);
+
+/// @throws std::invalid_argument unless [first, first + n) lies in [0, count).
+void check_columns(std::size_t first, std::size_t n, std::size_t count);
+
 }  // namespace eigenpose

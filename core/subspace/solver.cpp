@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/subspace/block_krylov.h"
 #include "core/subspace/solvers.h"
 
 namespace eigenpose {
@@ -20,17 +19,49 @@ struct NamedSolver {
   std::string_view name;
   Solve solve;
 };
-constexpr std::array kSolvers{NamedSolver{"gram", detail::solve_gram},
-                              NamedSolver{"dense", detail::solve_dense}};
+constexpr std::array kSolvers{
+    NamedSolver{"gram", detail::solve_gram}, NamedSolver{"krylov", detail::solve_krylov},
+    NamedSolver{"conjugate-gradient", detail::solve_conjugate_gradient},
+    NamedSolver{"sta", detail::solve_sta}, NamedSolver{"dense", detail::solve_dense}};
 
 /// An answer that may be farther from the true subspace is refused: the sine of 0.06°.
 constexpr double kLargestSine = 1e-3;
 
-std::string chosen_solver(const AppearanceSource&, const SolverOptions& options) {
-  return options.solver == "auto" ? "gram" : options.solver;
+/// Above so many views products with the views beat the Gram matrix, whose cost grows with their square.
+constexpr std::size_t kGramViews = 6000;
+
+std::string chosen_solver(const AppearanceSource& source, const SolverOptions& options) {
+  if (options.solver != "auto") return options.solver;
+  const std::size_t fixed = detail::gram_solver_memory(source.count(), source.length(), options.components);
+  // Tiles of a fair size beside the Gram matrix, or every view is read many times.
+  const bool fits = options.memory_limit == 0 || fixed <= options.memory_limit - options.memory_limit / 4;
+  return fits && source.count() <= kGramViews ? "gram" : "krylov";
 }
 
-void check_options(const AppearanceSource& source, const SolverOptions& options) {
+}  // namespace
+
+Eigenspace solve_eigenspace(const AppearanceSource& source, const SolverOptions& options,
+                            SolverReport* report, const Progress& progress, std::stop_token stop) {
+  const SolverOptions bounded = detail::checked_options(source, options);
+  const std::string name = chosen_solver(source, bounded);
+  const auto* solver =
+      std::find_if(kSolvers.begin(), kSolvers.end(), [&](const auto& s) { return s.name == name; });
+  if (solver == kSolvers.end()) {
+    std::string known = "auto";
+    for (const auto& s : kSolvers) known += ", " + std::string(s.name);
+    throw std::invalid_argument("unknown solver '" + options.solver + "'; known are " + known);
+  }
+  SolverReport result;
+  result.solver = name;
+  Eigenspace space = solver->solve({source, bounded, progress, std::move(stop)}, result);
+  detail::complete_report(space, options, result);
+  if (report != nullptr) *report = std::move(result);
+  return space;
+}
+
+namespace detail {
+
+SolverOptions checked_options(const AppearanceSource& source, const SolverOptions& options) {
   if (source.count() < 2) {
     throw std::invalid_argument("an eigenspace needs at least two views, there are " +
                                 std::to_string(source.count()));
@@ -40,39 +71,21 @@ void check_options(const AppearanceSource& source, const SolverOptions& options)
   if (options.energy && !(*options.energy > 0.0 && *options.energy <= 1.0)) {
     throw std::invalid_argument("energy = " + std::to_string(*options.energy) + ": it is a share in (0, 1]");
   }
-}
-
-}  // namespace
-
-Eigenspace solve_eigenspace(const AppearanceSource& source, const SolverOptions& options,
-                            SolverReport* report, const Progress& progress, std::stop_token stop) {
-  check_options(source, options);
-  const std::string name = chosen_solver(source, options);
-  const auto* solver =
-      std::find_if(kSolvers.begin(), kSolvers.end(), [&](const auto& s) { return s.name == name; });
-  if (solver == kSolvers.end()) {
-    std::string known = "auto";
-    for (const auto& s : kSolvers) known += ", " + std::string(s.name);
-    throw std::invalid_argument("unknown solver '" + options.solver + "'; known are " + known);
-  }
   SolverOptions bounded = options;
-  bounded.components = std::min(options.components, std::min(source.count() - 1, source.length()));
-  SolverReport result;
-  result.solver = name;
-  Eigenspace space = solver->solve({source, bounded, progress, std::move(stop)}, result);
-  result.components = static_cast<std::size_t>(space.components());
-  result.energy =
-      space.total_scatter > 0.0 ? std::min(1.0, space.eigenvalues.sum() / space.total_scatter) : 0.0;
-  if (result.components < options.components && !options.energy) {
-    if (!result.note.empty()) result.note += "; ";
-    result.note += "the views span " + std::to_string(result.components) + " dimensions, " +
-                   std::to_string(options.components) + " were asked for";
-  }
-  if (report != nullptr) *report = std::move(result);
-  return space;
+  bounded.components = std::min({options.components, source.count() - 1, source.length()});
+  return bounded;
 }
 
-namespace detail {
+void complete_report(const Eigenspace& space, const SolverOptions& asked, SolverReport& report) {
+  report.components = static_cast<std::size_t>(space.components());
+  report.energy =
+      space.total_scatter > 0.0 ? std::min(1.0, space.eigenvalues.sum() / space.total_scatter) : 0.0;
+  if (report.components < asked.components && !asked.energy) {
+    if (!report.note.empty()) report.note += "; ";
+    report.note += "the views span " + std::to_string(report.components) + " dimensions, " +
+                   std::to_string(asked.components) + " were asked for";
+  }
+}
 
 double rounding_of_scatter(std::size_t count) {
   return 64.0 * static_cast<double>(count) * std::numeric_limits<double>::epsilon();
@@ -92,17 +105,14 @@ Eigen::Index components_for(const Eigen::VectorXd& values, double total_scatter,
 }
 
 void judge(const EigenPairs& pairs, Eigen::Index kept, SolverReport& report) {
-  const double last = pairs.values[kept - 1];
-  const double next = kept < pairs.values.size() ? pairs.values[kept] : pairs.next_value;
-  const bool tied = last - next <= kEqualEigenvalues * pairs.values[0];
-  report.residual_over_gap = pairs.residuals.head(kept).norm() / (tied ? last : last - next);
+  report.residual_over_gap = residual_over_gap(pairs, kept);
   if (!(report.residual_over_gap <= kLargestSine)) {
     throw Error("the " + report.solver +
                 " solver did not reach an accurate eigenspace: residual over eigenvalue gap is " +
                 std::to_string(report.residual_over_gap) + ", at most " + std::to_string(kLargestSine) +
                 " is accepted; use another number of components or the gram solver");
   }
-  if (tied)
+  if (tied_cut(pairs, kept))
     report.note =
         "the last eigenvalue kept and the first left out are equal: the cut between them is one of many";
 }

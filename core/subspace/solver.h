@@ -15,6 +15,30 @@
 
 namespace eigenpose {
 
+/// How far the spatial-temporal adaptive solver may simplify the views. Its error bound follows from what it
+/// did.
+struct StaOptions {
+  std::size_t block = 8;  ///< side of the blocks of pixels, 2…16
+  /// Largest part of a unit-energy view that leaving out small coefficients may change, 0…1 (0 keeps all).
+  double spatial = 0.05;
+  /// The same for standing in an earlier view's block for a similar one.
+  double temporal = 0.05;
+};
+
+/// What the spatial-temporal adaptive solver did, and the proven bounds that follow.
+struct StaReport {
+  double largest_change = 0.0;       ///< δ: the most that a unit-energy view was changed, ‖Δⱼ‖
+  double product_error_bound = 0.0;  ///< every inner product is within 2δ + δ² of the true one
+  /// Every eigenvalue is within this of the true one: 2√(λ₁D) + D with D = Σ‖Δⱼ‖² (Weyl's inequality for
+  /// singular values).
+  double eigenvalue_error_bound = 0.0;
+  /// Bounds the sine of the largest angle to the true subspace: √D / (σ_K − σ_{K+1} − √D), 1 where that says
+  /// nothing (Wedin).
+  double angle_sine_bound = 1.0;
+  double coefficient_share = 0.0;  ///< of the N·M numbers, those kept in superblocks
+  double superblock_ratio = 0.0;   ///< superblocks over blocks of all views
+};
+
 struct SolverOptions {
   /// "auto", "gram", "krylov", "conjugate-gradient", "sta", "dense".
   std::string solver = "auto";
@@ -27,6 +51,7 @@ struct SolverOptions {
   unsigned threads = 0;
   /// Memory for tiles and the Gram matrix together, bytes; 0 means no limit.
   std::size_t memory_limit = 0;
+  StaOptions sta = {};  ///< for the solver "sta" alone
 };
 
 struct SolverReport {
@@ -41,7 +66,8 @@ struct SolverReport {
   Duration gram_time{};
   Duration solve_time{};
   Duration back_projection_time{};
-  std::string note;  ///< anything a person should know, e.g. a smaller rank than asked for
+  std::optional<StaReport> sta;  ///< of the solver "sta" alone
+  std::string note;              ///< anything a person should know, e.g. a smaller rank than asked for
 };
 
 /// The eigenspace of all views of `source`.

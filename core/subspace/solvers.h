@@ -9,6 +9,7 @@
 
 #include "core/base/progress.h"
 #include "core/subspace/appearance_source.h"
+#include "core/subspace/eigen_pairs.h"
 #include "core/subspace/eigenspace.h"
 #include "core/subspace/solver.h"
 
@@ -22,8 +23,26 @@ struct SolverTask {
   std::stop_token stop;
 };
 
+/// The options with K at most what M views of N numbers span. @throws std::invalid_argument for fewer than
+/// two views, no components, or an energy outside (0, 1].
+SolverOptions checked_options(const AppearanceSource& source, const SolverOptions& options);
+/// Fills components and energy, and notes where they are fewer than asked for.
+void complete_report(const Eigenspace& space, const SolverOptions& asked, SolverReport& report);
+
 Eigenspace solve_gram(const SolverTask& task, SolverReport& report);
 Eigenspace solve_dense(const SolverTask& task, SolverReport& report);
+Eigenspace solve_krylov(const SolverTask& task, SolverReport& report);
+Eigenspace solve_conjugate_gradient(const SolverTask& task, SolverReport& report);
+Eigenspace solve_sta(const SolverTask& task, SolverReport& report);
+
+/// The second half of the Gram solver: from the views' inner products to the eigenspace.
+/// @param gram as `gram_matrix` gives it. @param tile_memory bytes for views of a source that is not
+/// resident.
+Eigenspace solve_products(Eigen::MatrixXd gram, std::size_t tile_memory, const SolverTask& task,
+                          SolverReport& report);
+
+/// The K leading eigenpairs of a centred Gram matrix: block Krylov, or the full eigen-solve of small ones.
+EigenPairs leading_gram_pairs(const Eigen::MatrixXd& gram, const SolverTask& task);
 
 /// Memory that the Gram solver needs beside the tiles, bytes.
 std::size_t gram_solver_memory(std::size_t count, std::size_t length, std::size_t components);
@@ -34,14 +53,6 @@ double rounding_of_scatter(std::size_t count);
 /// How many of the descending `values` to keep: all, or the fewest that keep `energy` of the scatter.
 Eigen::Index components_for(const Eigen::VectorXd& values, double total_scatter,
                             const SolverOptions& options);
-
-/// The leading eigenpairs that a solver found, before the cut by energy.
-struct EigenPairs {
-  Eigen::VectorXd values;     ///< descending, positive
-  Eigen::MatrixXd vectors;    ///< orthonormal columns
-  Eigen::VectorXd residuals;  ///< ‖Q e − λ e‖, one a pair
-  double next_value = 0.0;    ///< the eigenvalue after the last one
-};
 
 /// By a full eigen-solve of a symmetric matrix in double: the leading `wanted`, those above `noise`.
 EigenPairs full_eigenpairs(const Eigen::MatrixXd& matrix, Eigen::Index wanted, double noise);

@@ -118,7 +118,8 @@ TEST_P(EverySolver, GivesTheSameBitsOnAnyNumberOfThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, EverySolver,
-                         testing::Combine(testing::Values("auto", "gram"), testing::ValuesIn(samples())),
+                         testing::Combine(testing::Values("auto", "gram", "krylov", "conjugate-gradient"),
+                                          testing::ValuesIn(samples())),
                          [](const auto& drawn) {
                            std::string name = std::get<0>(drawn.param) + std::get<1>(drawn.param).name;
                            std::erase(name, '-');

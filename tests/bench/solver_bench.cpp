@@ -1,0 +1,161 @@
+// The table of solvers × sets: time, peak memory, largest principal angle to the Gram solver's subspace
+// (which the tests hold against the dense oracle). Select rows with --benchmark_filter=.
+//
+// COIL sets come from the folder that EIGENPOSE_DATASETS names; without it only the made-up sets are
+// measured.
+
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/subspace/memory_source.h"
+#include "core/subspace/solver.h"
+#include "tests/core/subspace/subspace_samples.h"
+
+namespace eigenpose {
+namespace {
+
+struct Set {
+  std::string name;
+  std::vector<std::uint8_t> bytes;
+  std::unique_ptr<AppearanceSource> source;  ///< null where the images are missing
+};
+
+Set bytes_set(std::string name, std::vector<std::uint8_t> bytes, AppearanceShape shape) {
+  Set set{std::move(name), std::move(bytes), nullptr};
+  if (!set.bytes.empty()) set.source = std::make_unique<ByteSource>(set.bytes, shape.length(), shape);
+  return set;
+}
+
+/// All images of a folder in the order of object and number, at side × side; empty where one is missing.
+std::vector<std::uint8_t> images(const std::string& folder, int objects, int views, int step, int side,
+                                 bool color) {
+  std::vector<std::uint8_t> bytes;
+  const char* datasets = std::getenv("EIGENPOSE_DATASETS");
+  if (datasets == nullptr) return bytes;
+  for (int object = 1; object <= objects; ++object) {
+    for (int view = 0; view < views; ++view) {
+      const auto file = std::filesystem::path(datasets) / folder /
+                        ("obj" + std::to_string(object) + "__" + std::to_string(view * step) + ".png");
+      const cv::Mat image = cv::imread(file.string(), color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
+      if (image.empty()) return {};
+      cv::Mat scaled;
+      cv::resize(image, scaled, cv::Size(side, side), 0, 0, cv::INTER_AREA);
+      bytes.insert(bytes.end(), scaled.datastart, scaled.dataend);
+    }
+  }
+  return bytes;
+}
+
+const std::vector<std::function<Set()>>& makers() {
+  static const std::vector<std::function<Set()>> all{
+      [] {
+        return bytes_set("COIL-20 1440x16384 grey", images("coil-20", 20, 72, 1, 128, false), {128, 128, 1});
+      },
+      [] {
+        return bytes_set("COIL-100 half 3600x12288 colour", images("coil-100-half", 50, 72, 5, 64, true),
+                         {64, 64, 3});
+      },
+      [] {
+        return bytes_set("more views than pixels 3000x256", test::smooth_views(3000, 256, 1), {16, 16, 1});
+      },
+      [] {
+        Set set{"rank 12 1000x4096 float", {}, nullptr};
+        set.source = std::make_unique<FloatSource>(test::views_of_rank(4096, 1000, 12, 2));
+        return set;
+      },
+      [] {
+        Set set{"repeated eigenvalues 1024x4096 float", {}, nullptr};
+        set.source = std::make_unique<FloatSource>(test::turned_views(4096, 1024, 3));
+        return set;
+      }};
+  return all;
+}
+
+/// One set in memory at a time.
+const Set& set_number(std::size_t index) {
+  static Set current;
+  static std::size_t number = makers().size();
+  if (number != index) {
+    current = Set{};
+    current = makers()[index]();
+    number = index;
+  }
+  return current;
+}
+
+const std::vector<std::string>& solvers() {
+  static const std::vector<std::string> names{"gram", "krylov", "conjugate-gradient", "sta", "dense"};
+  return names;
+}
+
+double status_megabytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    if (word != key) continue;
+    double kilobytes = 0.0;
+    status >> kilobytes;
+    return kilobytes / 1024.0;
+  }
+  return 0.0;
+}
+
+void learn_set(benchmark::State& state) {
+  const auto index = static_cast<std::size_t>(state.range(0));
+  const std::string& solver = solvers()[static_cast<std::size_t>(state.range(1))];
+  const Set& set = set_number(index);
+  state.SetLabel(set.name + ", " + solver);
+  if (!set.source) {
+    state.SkipWithError("EIGENPOSE_DATASETS names no folder with these images");
+    return;
+  }
+  static std::map<std::size_t, Eigenspace> references;
+  if (!references.contains(index)) references[index] = solve_eigenspace(*set.source, {.solver = "gram"});
+  SolverOptions options;
+  options.solver = solver;
+  SolverReport report;
+  Eigenspace space;
+  std::ofstream("/proc/self/clear_refs") << '5';  // peak memory starts again from here
+  const double before = status_megabytes("VmRSS:");
+  for (auto _ : state) {
+    try {
+      space = solve_eigenspace(*set.source, options, &report);
+    } catch (const std::exception& error) {
+      state.SkipWithError(error.what());
+      return;
+    }
+  }
+  state.counters["K"] = static_cast<double>(report.components);
+  state.counters["peak_MB"] = status_megabytes("VmHWM:") - before;
+  state.counters["angle_deg"] = test::largest_angle_deg(space.basis, references[index].basis);
+  state.counters["residual_over_gap"] = report.residual_over_gap;
+  if (report.sta) {
+    state.counters["sta_coefficients"] = report.sta->coefficient_share;
+    state.counters["sta_superblocks"] = report.sta->superblock_ratio;
+    state.counters["sta_value_bound"] = report.sta->eigenvalue_error_bound;
+  }
+}
+BENCHMARK(learn_set)
+    ->ArgsProduct({{0, 1, 2, 3, 4}, {0, 1, 2, 3, 4}})
+    ->ArgNames({"set", "solver"})
+    ->Iterations(1)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace eigenpose
+
+BENCHMARK_MAIN();
