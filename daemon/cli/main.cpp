@@ -27,6 +27,9 @@ const std::vector<AddCommand> commands = {
     add_results_command,    //
     add_status_command,     //
     add_objects_command,    //
+#ifdef EIGENPOSE_SIM
+    add_lab_command,  //
+#endif
     add_import_command,     //
     add_learn_command,      //
     add_recognize_command,  //

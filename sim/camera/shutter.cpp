@@ -42,6 +42,7 @@ CameraStatistics Shutter::statistics() const {
 }
 
 bool Shutter::damaged(std::int64_t index, const CameraFaults& faults) const {
+  if (lab_.frame_damaged(start_of(index))) return true;
   if (faults.damaged_fraction <= 0.0) return false;
   Chance chance(lab_.seed() + static_cast<std::uint64_t>(index), damage_stream);
   return chance.uniform() < faults.damaged_fraction;

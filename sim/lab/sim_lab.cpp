@@ -173,6 +173,17 @@ CameraFaults SimLab::camera_faults() const {
   return camera_faults_;
 }
 
+void SimLab::damage_frames(TimePoint from, TimePoint until) {
+  const std::lock_guard lock(mutex_);
+  damaged_from_ = from;
+  damaged_until_ = until;
+}
+
+bool SimLab::frame_damaged(TimePoint exposure_start) const {
+  const std::lock_guard lock(mutex_);
+  return exposure_start >= damaged_from_ && exposure_start < damaged_until_;
+}
+
 const Trajectory& SimLab::motion_at(const Motion& motion, TimePoint when) {
   const Trajectory* current = &motion.front();
   for (const Trajectory& candidate : motion) {

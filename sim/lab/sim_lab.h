@@ -108,6 +108,9 @@ class SimLab {
   void set_lamp_level(double level);
   void set_camera_faults(const CameraFaults& faults);
   [[nodiscard]] CameraFaults camera_faults() const;
+  /// Frames whose exposure starts from `from` on and before `until` are damaged.
+  void damage_frames(TimePoint from, TimePoint until);
+  [[nodiscard]] bool frame_damaged(TimePoint exposure_start) const;
 
   // What drives do. --------------------------------------------------------------------------------------
   /// From its start on, the axis moves like this. In degrees.
@@ -154,6 +157,8 @@ class SimLab {
   std::uint64_t next_id_ = 1;                ///< guarded by mutex_
   double lamp_level_ = 1.0;                  ///< guarded by mutex_
   CameraFaults camera_faults_;               ///< guarded by mutex_
+  TimePoint damaged_from_;                   ///< guarded by mutex_
+  TimePoint damaged_until_;                  ///< guarded by mutex_
 };
 
 }  // namespace eigenpose::sim
