@@ -2,6 +2,7 @@
 
 // Boost 1.74's coroutines need std::exchange before them.
 #include <cstdlib>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -91,7 +92,7 @@ class Occupied {
 struct Server::Impl {
   /// One socket's acceptor and how many clients it has.
   struct Door {
-    Protocol::acceptor acceptor;
+    std::optional<Protocol::acceptor> acceptor;
     Access access;
     int clients = 0;
   };
@@ -107,7 +108,7 @@ struct Server::Impl {
     for (;;) {
       error_code error;
       Protocol::socket socket(*io);
-      co_await door.acceptor.async_accept(socket, capture(error));
+      co_await door.acceptor->async_accept(socket, capture(error));
       if (error == asio::error::operation_aborted) co_return;
       if (error) {
         // Out of descriptors: clients that leave give some back.
@@ -279,9 +280,12 @@ void Server::notify() {
 }
 
 void Server::stop() {
-  if (!impl_->thread.joinable()) return;
+  if (!impl_->io) return;
   impl_->io->stop();
-  impl_->thread.join();
+  if (impl_->thread.joinable()) impl_->thread.join();
+  // Acceptors need their io_context to go; what the connections count, in turn, outlives them.
+  for (const auto& door : impl_->doors) door->acceptor.reset();
+  impl_->io.reset();
 }
 
 }  // namespace eigenpose
