@@ -1,6 +1,8 @@
 #include "daemon/cli/rig_options.h"
 
 #include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
 
 namespace eigenpose::cli {
 
@@ -15,6 +17,10 @@ void RigOptions::add_to(CLI::App& command) {
 }
 
 Config RigOptions::read() const {
+  // What devices say goes to stderr and only if it is trouble: stdout is the command's own.
+  auto log = std::make_shared<spdlog::logger>("eigenpose", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  log->set_level(spdlog::level::warn);
+  spdlog::set_default_logger(std::move(log));
   Config rig = read_config(config);
   if (!runtime_dir.empty()) rig.daemon.runtime_dir = std::filesystem::absolute(runtime_dir);
   if (rig.sim) {
