@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 using sim::WireFault;
 using sim::WireFaultKind;
 
-constexpr auto response_timeout = 40ms;
+constexpr double quick = 30.0;  // a table of 30 deg/s and 60 deg/s² crosses a half turn in 0.2 s
 constexpr std::uint64_t seed = 11;
 
 std::filesystem::path new_folder() {
@@ -26,12 +26,12 @@ std::filesystem::path new_folder() {
 
 }  // namespace
 
-std::vector<WireFault> survivable_faults(ModbusLine line) {
+std::vector<WireFault> survivable_faults(ModbusLine line, std::chrono::milliseconds response_timeout) {
   std::vector<WireFault> faults = {
       {WireFaultKind::silence},
       {WireFaultKind::loss},
       {WireFaultKind::late, response_timeout / 2},
-      {WireFaultKind::late, response_timeout + 30ms},  // after the driver has given up
+      {WireFaultKind::late, 7 * response_timeout / 4},  // after the driver has given up
       {WireFaultKind::partial},
       {WireFaultKind::wrong_unit},
       {WireFaultKind::exception, {}, 6},  // "busy"
@@ -45,9 +45,9 @@ std::vector<WireFault> survivable_faults(ModbusLine line) {
   return faults;
 }
 
-ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::milliseconds watchdog)
+ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::milliseconds watchdog,
+                     std::chrono::milliseconds response_timeout)
     : lab_(clock_), line_(line), fault_rate_(fault_rate) {
-  constexpr double quick = 30.0;  // a table of 30 deg/s and 60 deg/s² crosses a half turn in 0.2 s
   ModbusBusOptions bus;
   if (line == ModbusLine::tcp) {
     tcp_.emplace(lab_, sim::SimModbusServerOptions{.speed_factor = quick});
@@ -89,6 +89,18 @@ void ModbusRig::random_faults() {
 
 double ModbusRig::true_position() {
   return wrap(lab_.axis_position_deg(sim::LabAxis::table, clock_.now()), 0.0, 360.0);
+}
+
+double ModbusRig::unwrapped_position() {
+  return lab_.axis_position_deg(sim::LabAxis::table, clock_.now());
+}
+
+void ModbusRig::turn_steadily(double degrees_per_s) {
+  // Direct data operation of type 16, continuous, as its registers stand from 0x0058 on.
+  const auto hz = static_cast<std::uint16_t>(degrees_per_s * 100.0 / quick);
+  const std::vector<std::uint16_t> registers = {0, 0, 0, 16, 0, 0, 0, hz, 0, 60000, 0, 60000, 0, 1000, 0, 1};
+  if (drive().write(0x0058, registers) != sim::ModbusException::none)
+    throw std::runtime_error("the drive does not turn");
 }
 
 bool ModbusRig::truly_moving() {

@@ -18,14 +18,18 @@ namespace eigenpose {
 
 enum class ModbusLine { tcp, rtu };
 
+constexpr std::chrono::milliseconds rig_response_timeout{40};
+
 /// What may go wrong on the line while the suite runs: everything that the driver can live through.
-std::vector<sim::WireFault> survivable_faults(ModbusLine line);
+std::vector<sim::WireFault> survivable_faults(
+    ModbusLine line, std::chrono::milliseconds response_timeout = rig_response_timeout);
 
 class ModbusRig final : public AxisRig {
  public:
   /// @param fault_rate of all requests, meets one of `survivable_faults`.
   ModbusRig(ModbusLine line, double fault_rate,
-            std::chrono::milliseconds watchdog = std::chrono::milliseconds(0));
+            std::chrono::milliseconds watchdog = std::chrono::milliseconds(0),
+            std::chrono::milliseconds response_timeout = rig_response_timeout);
   ~ModbusRig() override;
 
   Axis& axis() override { return *axis_; }
@@ -43,6 +47,10 @@ class ModbusRig final : public AxisRig {
   sim::AzDrive& drive() { return tcp_ ? tcp_->drive(1) : rtu_->drive(1); }
   sim::FaultPlan& faults() { return tcp_ ? tcp_->faults() : rtu_->faults(); }
   std::shared_ptr<ModbusBus> bus() { return bus_; }
+  /// Lets the drive turn steadily, with nobody asking the driver. @param degrees_per_s above 0.
+  void turn_steadily(double degrees_per_s);
+  /// Where the table really is, whole turns counted.
+  double unwrapped_position();
   /// Another axis of the same table on the same bus.
   ModbusAxisOptions options() const { return options_; }
 
