@@ -128,6 +128,38 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
   return static_cast<float>(std::sqrt(energy));
 }
 
+void shrink_appearance(std::span<const float> appearance, int size, int bands, int side,
+                       std::span<float> reduced) {
+  std::fill(reduced.begin(), reduced.end(), 0.0F);
+  const double scale = static_cast<double>(side) / size;
+  const float area = static_cast<float>(scale * scale);
+  // Where source pixel i falls: mostly into one target pixel, else into two.
+  const auto part = [&](int i, int& first) {
+    const double low = i * scale;
+    first = std::min(side - 1, static_cast<int>(low));
+    return static_cast<float>(std::min(1.0, (first + 1 - low) / scale));
+  };
+  for (int y = 0; y < size; ++y) {
+    int row = 0;
+    const float upper = part(y, row);
+    for (int x = 0; x < size; ++x) {
+      int column = 0;
+      const float left = part(x, column);
+      const float* pixel = appearance.data() + (static_cast<std::ptrdiff_t>(y) * size + x) * bands;
+      for (int dy = 0; dy < 2; ++dy) {
+        const float vertical = dy == 0 ? upper : 1.0F - upper;
+        if (vertical <= 0.0F || row + dy >= side) continue;
+        for (int dx = 0; dx < 2; ++dx) {
+          const float weight = area * vertical * (dx == 0 ? left : 1.0F - left);
+          if (weight <= 0.0F || column + dx >= side) continue;
+          float* out = reduced.data() + (static_cast<std::ptrdiff_t>(row + dy) * side + column + dx) * bands;
+          for (int b = 0; b < bands; ++b) out[b] += weight * pixel[b];
+        }
+      }
+    }
+  }
+}
+
 void quantize(std::span<const float> appearance, std::span<std::uint8_t> bytes) {
   const float largest = *std::max_element(appearance.begin(), appearance.end());
   const float gain = largest > 0.0F ? 255.0F / largest : 0.0F;

@@ -82,6 +82,10 @@ class Normalizer {
   std::vector<float> sums_;       ///< N rows of width × bands: the cut, averaged vertically
 };
 
+/// An appearance of size×size pixels averaged down to side×side; exact area means. @pre side ≤ size.
+void shrink_appearance(std::span<const float> appearance, int size, int bands, int side,
+                       std::span<float> reduced);
+
 /// The appearance as bytes: scaled so that its largest value is 255, then rounded. What learning keeps,
 /// because inner products of bytes are exact integers. @pre equal sizes.
 void quantize(std::span<const float> appearance, std::span<std::uint8_t> bytes);

@@ -4,12 +4,14 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/workspace.h"
 #include "core/image/normalization.h"
 #include "core/manifold/manifold.h"
+#include "core/model/object_space.h"
 #include "core/subspace/eigenspace.h"
 
 namespace eigenpose {
@@ -28,6 +30,8 @@ struct ModelObject {
   /// dof_observable of the first DOF, which is the object's turn: false where turning the object does not
   /// change its appearance, or makes it look the same several times a turn.
   bool pose_observable = true;
+  /// The object's own eigenspace, where the model was learned with one.
+  std::optional<ObjectSpace> space = std::nullopt;
   std::size_t views = 0;  ///< how many views it was learned from
 };
 

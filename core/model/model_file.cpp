@@ -97,6 +97,22 @@ std::string numbered(std::size_t i) {
   return text.data();
 }
 
+void write_eigenspace(const Hdf5Group& group, const Eigenspace& eigenspace) {
+  group.write("mean", Eigen::MatrixXf(eigenspace.mean));
+  group.write("basis", eigenspace.basis);
+  group.write("eigenvalues", Eigen::MatrixXd(eigenspace.eigenvalues));
+  group.write("total_scatter", eigenspace.total_scatter);
+}
+
+Eigenspace read_eigenspace(const Hdf5Group& group) {
+  Eigenspace eigenspace;
+  eigenspace.mean = group.read_floats("mean");
+  eigenspace.basis = group.read_floats("basis");
+  eigenspace.eigenvalues = group.read_doubles("eigenvalues");
+  eigenspace.total_scatter = group.read_double("total_scatter");
+  return eigenspace;
+}
+
 void write_object(const Hdf5Group& group, const ModelObject& object) {
   group.write("name", object.name);
   group.write("rejection_distance", object.rejection_distance);
@@ -105,6 +121,12 @@ void write_object(const Hdf5Group& group, const ModelObject& object) {
   group.write("views", static_cast<std::int64_t>(object.views));
   group.write("degree", std::int64_t{object.manifold.degree()});
   group.write("coefficients", object.manifold.coefficients());
+  if (object.space) {
+    const Hdf5Group space = group.make_group("space");
+    write_eigenspace(space, object.space->eigenspace);
+    space.write("coefficients", object.space->manifold.coefficients());
+    space.write("better_pose", std::int64_t{object.space->better_pose});
+  }
   const Hdf5Group axes = group.make_group("axes");
   for (std::size_t d = 0; d < object.workspace.size(); ++d) {
     const Hdf5Group axis = axes.make_group(numbered(d));
@@ -135,13 +157,23 @@ ModelObject read_object(const Hdf5Group& group) {
     sample_axes.push_back({dof, {samples.data(), samples.data() + samples.size()}});
     observable.push_back(axis.read_bool("observable"));
   }
-  ModelObject object{group.read_text("name"), Workspace(std::move(dofs)),
-                     Manifold::from_coefficients(std::move(sample_axes), group.read_doubles("coefficients"),
-                                                 static_cast<int>(group.read_integer("degree")))};
+  const int degree = static_cast<int>(group.read_integer("degree"));
+  std::optional<ObjectSpace> space;
+  const auto groups = group.group_names();
+  if (std::find(groups.begin(), groups.end(), "space") != groups.end()) {
+    const Hdf5Group own = group.open_group("space");
+    space = ObjectSpace{read_eigenspace(own),
+                        Manifold::from_coefficients(sample_axes, own.read_doubles("coefficients"), degree),
+                        own.read_bool("better_pose")};
+  }
+  ModelObject object{
+      group.read_text("name"), Workspace(std::move(dofs)),
+      Manifold::from_coefficients(std::move(sample_axes), group.read_doubles("coefficients"), degree)};
   object.rejection_distance = group.read_double("rejection_distance");
   object.typical_distance = group.read_double("typical_distance");
   object.dof_observable = std::move(observable);
   object.pose_observable = group.read_bool("pose_observable");
+  object.space = std::move(space);
   object.views = static_cast<std::size_t>(group.read_integer("views"));
   return object;
 }
@@ -151,11 +183,7 @@ void write_content(const Model& model, const std::filesystem::path& part) {
   const Hdf5Handle file = create_hdf5(part, header_size);
   const Hdf5Group root = root_of(file);
   write_normalization(root.make_group("normalization"), model.normalization);
-  const Hdf5Group eigenspace = root.make_group("eigenspace");
-  eigenspace.write("mean", Eigen::MatrixXf(model.eigenspace.mean));
-  eigenspace.write("basis", model.eigenspace.basis);
-  eigenspace.write("eigenvalues", Eigen::MatrixXd(model.eigenspace.eigenvalues));
-  eigenspace.write("total_scatter", model.eigenspace.total_scatter);
+  write_eigenspace(root.make_group("eigenspace"), model.eigenspace);
   const Hdf5Group objects = root.make_group("objects");
   for (std::size_t i = 0; i < model.objects.size(); ++i)
     write_object(objects.make_group(numbered(i)), model.objects[i]);
@@ -173,11 +201,7 @@ Model read_content(std::span<unsigned char> bytes) {
   const Hdf5Group root = root_of(file);
   Model model;
   model.normalization = read_normalization(root.open_group("normalization"));
-  const Hdf5Group eigenspace = root.open_group("eigenspace");
-  model.eigenspace.mean = eigenspace.read_floats("mean");
-  model.eigenspace.basis = eigenspace.read_floats("basis");
-  model.eigenspace.eigenvalues = eigenspace.read_doubles("eigenvalues");
-  model.eigenspace.total_scatter = eigenspace.read_double("total_scatter");
+  model.eigenspace = read_eigenspace(root.open_group("eigenspace"));
   const Hdf5Group objects = root.open_group("objects");
   for (const std::string& name : objects.group_names())
     model.objects.push_back(read_object(objects.open_group(name)));
@@ -190,15 +214,24 @@ Model read_content(std::span<unsigned char> bytes) {
   return model;
 }
 
+bool fits(const Eigenspace& space, const Manifold& manifold, std::size_t length) {
+  const auto n = static_cast<Eigen::Index>(length);
+  return space.mean.size() == n && space.basis.rows() == n && space.components() >= 1 &&
+         space.eigenvalues.size() == space.components() && manifold.dimensions() == space.components();
+}
+
 /// The parts fit together. @throws Hdf5Failure.
 void check_shapes(const Model& model) {
-  const auto length = static_cast<Eigen::Index>(appearance_length(model.normalization));
-  const Eigenspace& space = model.eigenspace;
-  bool fits = space.mean.size() == length && space.basis.rows() == length && space.components() >= 1 &&
-              space.eigenvalues.size() == space.components() && !model.objects.empty();
-  for (const ModelObject& object : model.objects)
-    fits = fits && object.manifold.dimensions() == space.components();
-  if (!fits) throw Hdf5Failure("has parts that do not fit together");
+  const NormalizationOptions& options = model.normalization;
+  const int side = reduced_side(options);
+  const auto reduced =
+      static_cast<std::size_t>(side) * static_cast<std::size_t>(side * appearance_bands(options));
+  bool good = !model.objects.empty();
+  for (const ModelObject& object : model.objects) {
+    good = good && fits(model.eigenspace, object.manifold, appearance_length(options));
+    if (object.space) good = good && fits(object.space->eigenspace, object.space->manifold, reduced);
+  }
+  if (!good) throw Hdf5Failure("has parts that do not fit together");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/recognition/object_spaces.h"
 
 namespace eigenpose {
 namespace {
@@ -102,6 +103,12 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
       measure_rejection(views, model.eigenspace, points, manifolds, options.rejection, progress, stop);
   told.rejection_time = watch.lap();
 
+  std::vector<ObjectSpace> spaces;
+  if (options.object_spaces)
+    spaces =
+        learn_object_spaces(views, told.evidence, options.spline_degree, options.threads, progress, stop);
+  told.object_space_time = watch.lap();
+
   for (std::size_t o = 0; o < manifolds.size(); ++o) {
     const ObjectViews& object = views.objects()[o];
     const RejectionEvidence& evidence = told.evidence[o];
@@ -111,6 +118,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     learned.dof_observable = evidence.dof_observable;
     learned.pose_observable = evidence.dof_observable.front();
     learned.views = object.count;
+    if (options.object_spaces) learned.space = std::move(spaces[o]);
     model.objects.push_back(std::move(learned));
   }
   model.provenance = {options.program_version, utc_now(), options.image_sets, told.solver.solver,

@@ -19,6 +19,9 @@ struct LearningOptions {
   SolverOptions solver;
   int spline_degree = 2;  ///< 1, 2 or 3
   RejectionOptions rejection;
+  /// Learn each object's own eigenspace too: for a second look where two objects are close, and for pose
+  /// where it is better.
+  bool object_spaces = true;
   unsigned threads = 0;  ///< 0: all cores. The model does not depend on it.
   /// Kept in the model's provenance.
   std::string image_sets;
@@ -33,6 +36,7 @@ struct LearningReport {
   Duration eigenspace_time{};
   Duration manifold_time{};
   Duration rejection_time{};
+  Duration object_space_time{};
   Duration total_time{};
 };
 

@@ -9,6 +9,7 @@
 #include "core/image/normalization.h"
 #include "core/image/segmentation.h"
 #include "core/manifold/search.h"
+#include "core/recognition/own_spaces.h"
 #include "core/recognition/pose_table.h"
 
 namespace eigenpose {
@@ -25,6 +26,8 @@ constexpr double effective_dimensions = 6.0;
 constexpr double sure_enough = 0.7;
 /// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
 constexpr double poses_apart = 1.0 / 12.0;
+/// Where the second best object is nearer than this times the best, the objects' own spaces decide.
+constexpr double second_look_ratio = 2.0;
 /// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.
 constexpr double least_side_share = 0.25;
 
@@ -47,6 +50,17 @@ std::vector<Manifold> manifolds_of(const Model& model) {
   return manifolds;
 }
 
+/// Two poses within one and a half steps of the learned grid. The own space says more precisely where in a
+/// valley the pose is; which valley it is, the universal space decides, which has seen all objects.
+bool same_valley(const Manifold& manifold, const ClosestPoint& a, const ClosestPoint& b) {
+  for (std::size_t d = 0; d < manifold.dofs(); ++d) {
+    const SampleAxis& axis = manifold.axes()[d];
+    const double step = axis.dof.period() / static_cast<double>(axis.samples.size());
+    if (std::abs(axis.dof.difference(a.q[d], b.q[d])) > 1.5 * step) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 /// The stages of recognition, each a function; what they pass on stands in the fields between them.
@@ -58,6 +72,7 @@ struct Recognizer::Impl {
   Normalizer normalizer;
   std::vector<Manifold> manifolds;
   std::unique_ptr<ManifoldSearch> search;
+  OwnSpaces own_spaces;
   std::vector<PoseTable> poses;  ///< one an object
   Eigen::VectorXf mean_point;    ///< basisᵀ mean
   double search_bound = 0.0;
@@ -65,7 +80,7 @@ struct Recognizer::Impl {
   // Scratch, reused from frame to frame.
   Eigen::VectorXf appearance;
   Eigen::VectorXf point;
-  std::array<ClosestPoint, 2> closest;
+  std::array<ClosestPoint, 3> closest;
   std::size_t closest_count = 0;
   std::array<double, max_manifold_dofs> other_q{};
   Region whole;
@@ -79,6 +94,9 @@ struct Recognizer::Impl {
   float normalize(const cv::Mat& image, std::size_t region);
   void project(float energy);
   void find_closest();
+  /// Puts first whichever close candidate explains the whole picture best, and takes the pose from where it
+  /// is seen best.
+  void look_again();
   void judge(Outcome& outcome);
   void estimate_pose(Outcome& outcome, const ClosestPoint& best);
 
@@ -94,6 +112,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned)
       normalizer(model->normalization),
       manifolds(manifolds_of(*model)),
       search(make_search("tree", manifolds)),
+      own_spaces(*model),
       mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
       appearance(model->eigenspace.length()),
       point(model->eigenspace.components()) {
@@ -130,6 +149,32 @@ void Recognizer::Impl::find_closest() {
   closest_count = search->nearest_into(point, closest, search_bound);
   // Nothing within reach: the nearest is still worth telling.
   if (closest_count == 0) closest_count = search->nearest_into(point, std::span(closest).first(1));
+}
+
+void Recognizer::Impl::look_again() {
+  const auto has_space = [&](const ClosestPoint& found) { return own_spaces.has(found.manifold); };
+  const auto end = closest.begin() + static_cast<std::ptrdiff_t>(closest_count);
+  const auto close = std::find_if(closest.begin() + 1, end, [&](const ClosestPoint& found) {
+    return found.distance > second_look_ratio * closest[0].distance;
+  });
+  const bool doubtful = close - closest.begin() > 1;
+  const auto better_pose = [&](const ClosestPoint& found) {
+    return model->objects[found.manifold].space->better_pose;
+  };
+  if (!std::all_of(closest.begin(), close, has_space) || (!doubtful && !better_pose(closest[0]))) return;
+  own_spaces.look({appearance.data(), static_cast<std::size_t>(appearance.size())});
+  std::array<ClosestPoint, 3> seen;
+  for (auto found = closest.begin(); found != close; ++found)
+    seen[static_cast<std::size_t>(found - closest.begin())] = own_spaces.closest(found->manifold);
+  const auto count = close - closest.begin();
+  const auto winner =
+      std::min_element(seen.begin(), seen.begin() + count,
+                       [](const ClosestPoint& a, const ClosestPoint& b) { return a.distance < b.distance; }) -
+      seen.begin();
+  std::rotate(closest.begin(), closest.begin() + winner, closest.begin() + winner + 1);
+  const ClosestPoint& own = seen[static_cast<std::size_t>(winner)];
+  if (better_pose(closest[0]) && same_valley(model->objects[own.manifold].manifold, own, closest[0]))
+    closest[0].q = own.q;
 }
 
 void Recognizer::Impl::judge(Outcome& outcome) {
@@ -258,6 +303,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
     {
       const Lap lap(spent.search);
       impl.find_closest();
+      impl.look_again();
       impl.judge(outcome);
     }
   }

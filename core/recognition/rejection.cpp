@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <numeric>
 #include <random>
@@ -12,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/manifold/search.h"
+#include "core/recognition/leave_out.h"
 
 namespace eigenpose {
 namespace {
@@ -77,58 +77,6 @@ std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& o
   return distances;
 }
 
-/// The grid without every second value of axis `d`, beginning with value `first`: points to fit, and those
-/// left out.
-struct Fold {
-  std::vector<SampleAxis> axes;
-  std::vector<Eigen::Index> kept;
-  std::vector<Eigen::Index> left_out;
-};
-
-Fold make_fold(const ObjectViews& object, std::size_t d, std::size_t first) {
-  Fold fold;
-  fold.axes = object.axes;
-  const auto& all = object.axes[d].samples;
-  const bool open = !object.axes[d].dof.periodic;
-  const auto leaves = [&](std::size_t i) {
-    const bool end = i == 0 || i + 1 == all.size();
-    return i % 2 == first && !(open && end);  // beyond the end of an open axis there is no manifold
-  };
-  auto& samples = fold.axes[d].samples;
-  samples.clear();
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (!leaves(i)) samples.push_back(all[i]);
-  std::size_t inner = 1;
-  for (std::size_t a = d + 1; a < object.axes.size(); ++a) inner *= object.axes[a].samples.size();
-  for (std::size_t cell = 0; cell < object.count; ++cell) {
-    const std::size_t i = (cell / inner) % all.size();
-    (leaves(i) ? fold.left_out : fold.kept).push_back(static_cast<Eigen::Index>(object.first + cell));
-  }
-  return fold;
-}
-
-/// |error| in DOF d of views that were left out along it. Empty when there are too few values.
-std::vector<double> left_out_errors(const ObjectViews& object, std::size_t d, const Eigen::MatrixXd& points,
-                                    int degree) {
-  const auto& axis = object.axes[d];
-  std::vector<double> errors;
-  if (axis.samples.size() < (axis.dof.periodic ? 6U : 5U)) return errors;
-  std::size_t inner = 1;
-  for (std::size_t a = d + 1; a < object.axes.size(); ++a) inner *= object.axes[a].samples.size();
-  for (std::size_t first = 0; first < 2; ++first) {
-    const Fold fold = make_fold(object, d, first);
-    const std::vector<Manifold> manifold{
-        Manifold::interpolate(fold.axes, points(Eigen::all, fold.kept), degree)};
-    const auto search = make_search("tree", manifold);
-    for (const Eigen::Index i : fold.left_out) {
-      const double found = search->nearest(points.col(i).cast<float>(), 1).front().q[d];
-      const std::size_t sample = ((static_cast<std::size_t>(i) - object.first) / inner) % axis.samples.size();
-      errors.push_back(std::abs(axis.dof.difference(found, axis.samples[sample])));
-    }
-  }
-  return errors;
-}
-
 }  // namespace
 
 std::vector<RejectionEvidence> measure_rejection(const ViewStore& views, const Eigenspace& eigenspace,
@@ -152,13 +100,15 @@ std::vector<RejectionEvidence> measure_rejection(const ViewStore& views, const E
         moved_distances(views, object, eigenspace, *search, options, static_cast<std::uint32_t>(o + 1));
     found.typical_distance = root_mean_square(distances);
     found.rejection_distance = options.slack * quantile(distances, options.accepted_share);
+    const Eigen::MatrixXd own =
+        points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count));
     for (std::size_t d = 0; d < object.axes.size(); ++d) {
-      const auto errors = left_out_errors(object, d, points, manifolds[o].degree());
-      found.left_out_error.push_back(errors.empty() ? std::numeric_limits<double>::quiet_NaN()
-                                                    : quantile(errors, 0.5));
-      found.dof_observable.push_back(errors.empty() ||
-                                     found.left_out_error.back() <=
-                                         observable_error_share * object.axes[d].dof.period());
+      auto errors = left_out_errors(object, d, manifolds[o].degree(), [&](const Fold& fold) {
+        return FoldPoints{own(Eigen::all, fold.kept), own(Eigen::all, fold.left_out)};
+      });
+      found.dof_observable.push_back(
+          errors.empty() || quantile(errors, 0.5) <= observable_error_share * object.axes[d].dof.period());
+      found.left_out_errors.push_back(std::move(errors));
     }
     const std::lock_guard lock(progress_mutex);
     if (progress) progress({"measuring rejection", ++done, manifolds.size()});

@@ -37,8 +37,9 @@ struct RejectionEvidence {
   double rejection_distance = 0.0;
   double typical_distance = 0.0;  ///< root mean square of the moved views' distances
   std::vector<bool> dof_observable;
-  /// Median |error| of left-out views in each DOF, in its unit; NaN where too few values to leave any out.
-  std::vector<double> left_out_error;
+  /// For each DOF |error| of left-out views, in its unit; empty where there are too few values to leave any
+  /// out.
+  std::vector<std::vector<double>> left_out_errors;
 };
 
 /// @param points K × M projections of the store's views.

@@ -1,9 +1,11 @@
 /// `eigenpose learn`: image sets become a model.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -37,11 +39,19 @@ double seconds(Duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
+/// NaN of nothing.
+double median(std::vector<double> values) {
+  if (values.empty()) return NAN;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 void print(const Model& model, const LearningReport& report, const std::string& file) {
   std::printf("%-16s %6s %18s  %s\n", "object", "views", "rejection distance", "pose");
   for (std::size_t o = 0; o < model.objects.size(); ++o) {
     const ModelObject& object = model.objects[o];
-    const double error = report.evidence[o].left_out_error.front();
+    const double error = median(report.evidence[o].left_out_errors.front());
     std::printf("%-16s %6zu %18.4f  ", object.name.c_str(), object.views, object.rejection_distance);
     if (!object.pose_observable)
       std::printf("cannot be seen: left-out views are %.0f %s off\n", error,
