@@ -222,7 +222,7 @@ void Renderer::light_stage(const Light& light) {
   cv::add(stage_->room, stage_->lamp, stage_->both);
 }
 
-cv::Mat Renderer::render(const SceneState& scene) {
+cv::Mat Renderer::render(const SceneState& scene, bool smooth) {
   const Light light = light_of(scene);
   light_stage(light);
   const Tracer tracer(camera_, light, bodies_of(scene), options_.bounce_rays);
@@ -238,6 +238,7 @@ cv::Mat Renderer::render(const SceneState& scene) {
     canvas_->cast_once(*stage_, camera_, tracer, 2 * static_cast<int>(pair));
   });
   cv::Mat picture = canvas_->once.clone();
+  if (!smooth) return picture;
   parallel_for(rows, options_.threads, [&](std::size_t row) {
     canvas_->refine_edges(*stage_, camera_, tracer, picture, static_cast<int>(row));
   });

@@ -34,7 +34,8 @@ class Renderer {
   [[nodiscard]] const RenderOptions& options() const { return options_; }
   /// CV_32FC3, blue, green, red, linear; 1 is what a white sheet on the table sends back under the full lamp,
   /// about. Objects unknown to the catalogue are left out.
-  [[nodiscard]] cv::Mat render(const SceneState& scene);
+  /// @param smooth false: one ray a pixel everywhere, for parts of a blur.
+  [[nodiscard]] cv::Mat render(const SceneState& scene, bool smooth = true);
 
  private:
   struct Stage;

@@ -93,8 +93,19 @@ std::vector<Body> bodies_of(const SceneState& scene) {
 }
 
 struct Tracer::Rays {
-  Vec3 origin[4];
-  Vec3 direction[4];
+  std::array<Vec3, 4> origin;
+  std::array<Vec3, 4> direction;
+};
+
+struct Tracer::Surface {
+  Vec3 point;
+  Vec3 normal;
+  Vec3 to_viewer;
+  Vec3 to_light;
+  Paint paint;
+  float openness = 1.0F;
+  int what = -1;
+  bool faces_lamp = false;
 };
 
 struct Tracer::Hit {
@@ -165,18 +176,22 @@ Vec3 Tracer::lamp_irradiance(Vec3 point) const {
   return strength * Vec3{1.0F, 0.965F, 0.91F};
 }
 
-float Tracer::lamp_visible(Vec3 point) const {
-  alignas(16) std::array<int, 4> valid{-1, -1, -1, -1};
-  const Vec3 way = light_.position - point;
-  const float reach = length(way);
-  const Vec3 direction = (1.0F / reach) * way;
+std::array<bool, 4> Tracer::blocked(const std::array<Vec3, 4>& from, std::array<bool, 4> wanted) const {
+  alignas(16) std::array<int, 4> valid{};
+  for (std::size_t k = 0; k < 4; ++k) valid[k] = wanted[k] ? -1 : 0;
+  std::array<bool, 4> result{};
   for (const Body& body : bodies_) {
-    // The lamp's points lie off the middle ray by at most its radius.
-    if (!passes(point, direction, reach, body.middle, body.model->radius() + stage::lamp_radius_mm)) continue;
+    bool near = false;
+    for (std::size_t k = 0; k < 4 && !near; ++k) {
+      const Vec3 way = lamp_points_[k] - from[k];
+      const float reach = length(way);
+      near = valid[k] != 0 && passes(from[k], (1.0F / reach) * way, reach, body.middle, body.model->radius());
+    }
+    if (!near) continue;
     alignas(16) RTCRay4 packet{};
-    const Vec3 o = body.to_local(point);
     for (std::size_t k = 0; k < 4; ++k) {
-      const Vec3 d = body.direction_to_local(lamp_points_[k] - point);
+      const Vec3 o = body.to_local(from[k]);
+      const Vec3 d = body.direction_to_local(lamp_points_[k] - from[k]);
       packet.org_x[k] = o.x;
       packet.org_y[k] = o.y;
       packet.org_z[k] = o.z;
@@ -191,12 +206,19 @@ float Tracer::lamp_visible(Vec3 point) const {
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcOccluded4(valid.data(), body.model->scene(), &context, &packet);
     for (std::size_t k = 0; k < 4; ++k) {
-      if (packet.tfar[k] < 0.0F) valid[k] = 0;
+      if (valid[k] == 0 || packet.tfar[k] >= 0.0F) continue;
+      valid[k] = 0;
+      result[k] = true;
     }
   }
-  int open = 0;
-  for (const int v : valid) open += v != 0 ? 1 : 0;
-  return 0.25F * static_cast<float>(open);
+  return result;
+}
+
+float Tracer::lamp_visible(Vec3 point) const {
+  float open = 0.0F;
+  for (const bool dark : blocked({point, point, point, point}, {true, true, true, true}))
+    open += dark ? 0.0F : 0.25F;
+  return open;
 }
 
 StagePoint stage_point(Vec3 camera, Vec3 direction) {
@@ -237,40 +259,72 @@ Vec3 Tracer::stage_in_lamp(const StagePoint& place) const {
   return std::max(nl, 0.0F) * (place.albedo * lamp_irradiance(place.point));
 }
 
-Sample Tracer::shade(const Hit& hit, Vec3 origin, Vec3 direction, bool with_bounce) const {
+Tracer::Surface Tracer::surface_at(const Hit& hit, Vec3 origin, Vec3 direction) const {
   const Body& body = bodies_[static_cast<std::size_t>(hit.body)];
   const Mesh& mesh = body.model->mesh();
   const std::uint32_t* corner = &mesh.triangles[3 * static_cast<std::size_t>(hit.triangle)];
   const float w = 1.0F - hit.u - hit.v;
   const Vec3 local_normal = normalized(w * mesh.normals[corner[0]] + hit.u * mesh.normals[corner[1]] +
                                        hit.v * mesh.normals[corner[2]]);
-  const float openness =
+  Surface surface;
+  surface.openness =
       w * mesh.openness[corner[0]] + hit.u * mesh.openness[corner[1]] + hit.v * mesh.openness[corner[2]];
-  const Vec3 point = origin + hit.distance * direction;
-  const Vec3 local = body.to_local(point);
+  surface.point = origin + hit.distance * direction;
+  const Vec3 local = body.to_local(surface.point);
   int part = mesh.parts[corner[0]];
   if (part != mesh.parts[corner[1]] || part != mesh.parts[corner[2]])
     part = body.model->shape().field(local).part;
-  const Paint paint = body.model->shape().paint(local, local_normal, part);
-
-  const Vec3 to_viewer = -direction;
-  Vec3 normal = body.direction_to_world(local_normal);
+  surface.what = 64 * hit.body + part;
+  surface.paint = body.model->shape().paint(local, local_normal, part);
+  surface.to_viewer = -direction;
+  surface.normal = body.direction_to_world(local_normal);
   // An interpolated normal may look away from the viewer at the outline.
-  const float away = dot(normal, to_viewer);
-  if (away < 0.0F) normal = normalized(normal - (1.01F * away) * to_viewer);
+  const float away = dot(surface.normal, surface.to_viewer);
+  if (away < 0.0F) surface.normal = normalized(surface.normal - (1.01F * away) * surface.to_viewer);
+  surface.to_light = normalized(light_.position - surface.point);
+  surface.faces_lamp = light_.level > 0.0F && dot(surface.normal, surface.to_light) > 0.0F;
+  return surface;
+}
 
-  Sample result;
-  result.what = 64 * hit.body + part;
-  result.colour = reflected_room(paint, normal, to_viewer, openness);
-  const Vec3 to_light = normalized(light_.position - point);
-  if (light_.level > 0.0F && dot(normal, to_light) > 0.0F) {
-    const float visible = lamp_visible(point + clear_of_surface * normal);
-    if (visible > 0.0F) {
-      result.colour += reflected(paint, normal, to_light, to_viewer, visible * lamp_irradiance(point));
-    }
+Vec3 Tracer::shaded(const Surface& surface, float lamp_share, bool with_bounce) const {
+  Vec3 colour = reflected_room(surface.paint, surface.normal, surface.to_viewer, surface.openness);
+  if (surface.faces_lamp && lamp_share > 0.0F) {
+    colour += reflected(surface.paint, surface.normal, surface.to_light, surface.to_viewer,
+                        lamp_share * lamp_irradiance(surface.point));
   }
-  if (with_bounce) result.colour += (1.0F - paint.metal) * (paint.albedo * bounced(point, normal));
-  return result;
+  if (with_bounce) {
+    colour += (1.0F - surface.paint.metal) * (surface.paint.albedo * bounced(surface.point, surface.normal));
+  }
+  return colour;
+}
+
+// Four neighbours first look at one point of the lamp each. Where they agree, none is in a half shadow; where
+// they don't, each looks at all four points.
+std::array<Sample, 4> Tracer::shaded_hits(const Rays& rays, const std::array<Hit, 4>& hits,
+                                          bool with_bounce) const {
+  std::array<Surface, 4> surfaces;
+  std::array<Vec3, 4> above;
+  std::array<bool, 4> wanted{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (hits[k].body < 0) continue;
+    surfaces[k] = surface_at(hits[k], rays.origin[k], rays.direction[k]);
+    above[k] = surfaces[k].point + clear_of_surface * surfaces[k].normal;
+    wanted[k] = surfaces[k].faces_lamp;
+  }
+  const std::array<bool, 4> dark = blocked(above, wanted);
+  bool any_dark = false;
+  bool any_lit = false;
+  for (std::size_t k = 0; k < 4; ++k) {
+    any_dark = any_dark || (wanted[k] && dark[k]);
+    any_lit = any_lit || (wanted[k] && !dark[k]);
+  }
+  std::array<Sample, 4> samples;
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (hits[k].body < 0) continue;
+    const float share = any_dark && any_lit && wanted[k] ? lamp_visible(above[k]) : (any_lit ? 1.0F : 0.0F);
+    samples[k] = {shaded(surfaces[k], share, with_bounce), surfaces[k].what};
+  }
+  return samples;
 }
 
 Vec3 Tracer::bounced(Vec3 point, Vec3 normal) const {
@@ -290,9 +344,7 @@ Vec3 Tracer::bounced(Vec3 point, Vec3 normal) const {
           (r * std::cos(angle)) * t + (r * std::sin(angle)) * b + std::sqrt(1.0F - u) * normal;
     }
     intersect(rays, hits);
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (hits[k].body >= 0) sum += shade(hits[k], rays.origin[k], rays.direction[k], false).colour;
-    }
+    for (const Sample& sample : shaded_hits(rays, hits, false)) sum += sample.colour;
   }
   return (1.0F / static_cast<float>(bounce_rays_)) * sum;
 }
@@ -305,11 +357,7 @@ std::array<Sample, 4> Tracer::sample(const std::array<Vec3, 4>& directions) cons
     rays.direction[k] = directions[k];
   }
   intersect(rays, hits);
-  std::array<Sample, 4> samples;
-  for (std::size_t k = 0; k < 4; ++k) {
-    if (hits[k].body >= 0) samples[k] = shade(hits[k], rays.origin[k], directions[k], bounce_rays_ > 0);
-  }
-  return samples;
+  return shaded_hits(rays, hits, bounce_rays_ > 0);
 }
 
 }  // namespace eigenpose::sim

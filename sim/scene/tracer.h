@@ -95,10 +95,18 @@ class Tracer {
  private:
   struct Hit;
   struct Rays;
+  struct Surface;
   void intersect(const Rays& rays, std::array<Hit, 4>& hits) const;
-  [[nodiscard]] Sample shade(const Hit& hit, Vec3 origin, Vec3 direction, bool with_bounce) const;
+  [[nodiscard]] Surface surface_at(const Hit& hit, Vec3 origin, Vec3 direction) const;
+  [[nodiscard]] Vec3 shaded(const Surface& surface, float lamp_share, bool with_bounce) const;
+  [[nodiscard]] std::array<Sample, 4> shaded_hits(const Rays& rays, const std::array<Hit, 4>& hits,
+                                                  bool with_bounce) const;
   [[nodiscard]] Vec3 bounced(Vec3 point, Vec3 normal) const;
   [[nodiscard]] Vec3 lamp_irradiance(Vec3 point) const;
+  /// Is the way from each point to its own point of the lamp barred? Looked at where wanted.
+  [[nodiscard]] std::array<bool, 4> blocked(const std::array<Vec3, 4>& from,
+                                            std::array<bool, 4> wanted) const;
+  /// The share of the lamp that a point sees.
   [[nodiscard]] float lamp_visible(Vec3 point) const;
 
   const Pinhole& camera_;
