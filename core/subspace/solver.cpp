@@ -27,15 +27,18 @@ constexpr std::array kSolvers{
 /// An answer that may be farther from the true subspace is refused: the sine of 0.06°.
 constexpr double kLargestSine = 1e-3;
 
-/// Above so many views products with the views beat the Gram matrix, whose cost grows with their square.
-constexpr std::size_t kGramViews = 6000;
+/// Above so many views products with the views are quicker than the Gram matrix, whose cost grows with their
+/// square (measured on two cores with AVX2). Integer products are quicker than those of floats.
+constexpr std::size_t kGramViewsOfBytes = 4000;
+constexpr std::size_t kGramViewsOfFloats = 2000;
 
 std::string chosen_solver(const AppearanceSource& source, const SolverOptions& options) {
   if (options.solver != "auto") return options.solver;
   const std::size_t fixed = detail::gram_solver_memory(source.count(), source.length(), options.components);
   // Tiles of a fair size beside the Gram matrix, or every view is read many times.
   const bool fits = options.memory_limit == 0 || fixed <= options.memory_limit - options.memory_limit / 4;
-  return fits && source.count() <= kGramViews ? "gram" : "krylov";
+  const std::size_t most = source.has_bytes() ? kGramViewsOfBytes : kGramViewsOfFloats;
+  return fits && source.count() <= most ? "gram" : "krylov";
 }
 
 }  // namespace

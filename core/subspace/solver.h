@@ -40,7 +40,13 @@ struct StaReport {
 };
 
 struct SolverOptions {
-  /// "auto", "gram", "krylov", "conjugate-gradient", "sta", "dense".
+  /// - "gram": eigenvectors of the M × M Gram matrix, exact integers where the views are 8-bit. 8M² bytes.
+  /// - "krylov": block Krylov on products with the views; no matrix. Refuses an answer it is not sure of.
+  /// - "conjugate-gradient": one eigenvector after the other, deflated (appendix A); for comparison.
+  /// - "sta": spatial-temporal adaptive: approximate, with proven bounds in the report. Wants `shape()` of
+  /// the source.
+  /// - "dense": full eigen-solve in double; small sets, and the oracle.
+  /// - "auto": gram up to some thousand views where it fits into memory, else krylov.
   std::string solver = "auto";
   /// K. At most M−1; fewer are returned where the appearances span fewer dimensions (the report says so).
   std::size_t components = 20;
@@ -49,7 +55,8 @@ struct SolverOptions {
   std::optional<double> energy = std::nullopt;
   /// Threads for the products; 0 means all cores. The result does not depend on it.
   unsigned threads = 0;
-  /// Memory for tiles and the Gram matrix together, bytes; 0 means no limit.
+  /// Memory for all that the solver holds at once (tiles of views that are not in memory already, Gram
+  /// matrix, vectors, the result), bytes; 0 means no limit. Each thread needs about 0.6 MB more.
   std::size_t memory_limit = 0;
   StaOptions sta = {};  ///< for the solver "sta" alone
 };

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -127,6 +128,7 @@ void learn_set(benchmark::State& state) {
   options.solver = solver;
   SolverReport report;
   Eigenspace space;
+  ::malloc_trim(0);                               // memory freed before must not hide what is used now
   std::ofstream("/proc/self/clear_refs") << '5';  // peak memory starts again from here
   const double before = status_megabytes("VmRSS:");
   for (auto _ : state) {
@@ -147,8 +149,16 @@ void learn_set(benchmark::State& state) {
     state.counters["sta_value_bound"] = report.sta->eigenvalue_error_bound;
   }
 }
+/// Every solver on every set, but the full eigen-solve of 3600 views, which takes minutes.
+void rows_of_the_table(benchmark::internal::Benchmark* table) {
+  for (int set = 0; set < static_cast<int>(makers().size()); ++set) {
+    for (int solver = 0; solver < static_cast<int>(solvers().size()); ++solver) {
+      if (set != 1 || solvers()[static_cast<std::size_t>(solver)] != "dense") table->Args({set, solver});
+    }
+  }
+}
 BENCHMARK(learn_set)
-    ->ArgsProduct({{0, 1, 2, 3, 4}, {0, 1, 2, 3, 4}})
+    ->Apply(rows_of_the_table)
     ->ArgNames({"set", "solver"})
     ->Iterations(1)
     ->MeasureProcessCPUTime()

@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/subspace/memory_source.h"
+#include "core/subspace/solvers.h"
 #include "tests/core/subspace/subspace_samples.h"
 
 namespace eigenpose {
@@ -53,11 +54,11 @@ std::vector<Sample> samples() {
   return {
       {"FewerViewsThanPixels", [] { return bytes_of(90, 700); }, 10, 10},
       {"MoreViewsThanPixels", [] { return bytes_of(400, 60); }, 10, 10},
-      {"ManyViews", [] { return bytes_of(500, 900); }, 20, 20},
+      {"ManyViews", [] { return bytes_of(400, 500); }, 20, 20},
       {"EveryDirection", [] { return bytes_of(12, 300); }, 40, 11},
       {"RankDeficient", [] { return std::make_unique<FloatSource>(test::views_of_rank(400, 300, 7, 5)); }, 20,
        8},
-      {"RepeatedEigenvalues", [] { return std::make_unique<FloatSource>(test::turned_views(720, 360, 6)); },
+      {"RepeatedEigenvalues", [] { return std::make_unique<FloatSource>(test::turned_views(600, 300, 6)); },
        20, 20},
       {"TwoViews", [] { return bytes_of(2, 50); }, 20, 1},
   };
@@ -118,7 +119,7 @@ TEST_P(EverySolver, GivesTheSameBitsOnAnyNumberOfThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, EverySolver,
-                         testing::Combine(testing::Values("auto", "gram", "krylov", "conjugate-gradient"),
+                         testing::Combine(testing::Values("gram", "krylov", "conjugate-gradient"),
                                           testing::ValuesIn(samples())),
                          [](const auto& drawn) {
                            std::string name = std::get<0>(drawn.param) + std::get<1>(drawn.param).name;
@@ -180,6 +181,44 @@ TEST(Solver, RefusesWhatCannotBeLearned) {
   EXPECT_THROW(solve_eigenspace(*source, {.solver = "gram", .memory_limit = 100}), std::invalid_argument);
   const OwnedBytes same(std::vector<std::uint8_t>(500, 7), 50);
   EXPECT_THROW(solve_eigenspace(same, {}), Error) << "ten times the same view";
+}
+
+TEST(Solver, ChoosesTheGramMatrixForFewViewsAndKrylovWhereItDoesNotFit) {
+  const auto source = bytes_of(300, 100);
+  SolverReport report;
+  solve_eigenspace(*source, {.components = 5}, &report);
+  EXPECT_EQ(report.solver, "gram");
+  // The Gram matrix alone takes 720 kB.
+  solve_eigenspace(*source, {.components = 5, .memory_limit = 700'000}, &report);
+  EXPECT_EQ(report.solver, "krylov");
+  const FloatSource many(test::views_of_rank(30, 2100, 10, 3));
+  solve_eigenspace(many, {.components = 5}, &report);
+  EXPECT_EQ(report.solver, "krylov");
+}
+
+TEST(Solver, RefusesAnAnswerWhoseResidualIsTooLargeForTheGap) {
+  EigenPairs pairs;
+  pairs.values = Eigen::Vector2d(10.0, 5.0);
+  pairs.vectors = Eigen::MatrixXd::Identity(4, 2);
+  pairs.residuals = Eigen::Vector2d(0.0, 1e-3);
+  pairs.next_value = 4.0;
+  SolverReport report;
+  report.solver = "krylov";
+  // 1e-3 over a gap of 1 passes, over a gap of 0.01 it does not: a residual that is small for λ₁ says
+  // nothing.
+  detail::judge(pairs, 2, report);
+  EXPECT_DOUBLE_EQ(report.residual_over_gap, 1e-3);
+  pairs.next_value = 4.99;
+  EXPECT_THROW(detail::judge(pairs, 2, report), Error);
+  // A next value that may be as large as the last one kept leaves no gap to trust.
+  pairs.next_value = 4.0;
+  pairs.next_residual = 1.5;
+  EXPECT_THROW(detail::judge(pairs, 2, report), Error);
+  // Equal eigenvalues at the cut are no error, but are said.
+  pairs.next_value = 5.0;
+  pairs.next_residual = 0.0;
+  detail::judge(pairs, 2, report);
+  EXPECT_NE(report.note.find("equal"), std::string::npos);
 }
 
 TEST(Solver, StopsOnRequest) {
