@@ -1,0 +1,317 @@
+// FtdiLink and an APT stage behind it, on an emulated FTDI chip, the kernel's USB and its ftdi_sio. Runs in
+// the guest.
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "core/base/error.h"
+#include "drivers/usb/apt_axis.h"
+#include "drivers/usb/ftdi_link.h"
+#include "sim/lab/sim_lab.h"
+#include "sim/usb/apt_controller.h"
+
+namespace eigenpose {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+/// How much slower the emulated machine may be.
+constexpr int slowness = 5;
+constexpr Duration return_time = 2s;  ///< within which a device that is back must work again
+
+const char* const far_end_device = "/dev/ttyS1";
+
+/// What is wired to the chip's serial side: the guest's second serial port, and someone who answers there.
+class FarEnd {
+ public:
+  using Answer = std::function<std::vector<std::uint8_t>(std::span<const std::uint8_t>)>;
+
+  /// @param answer to what came in; also called with nothing now and then, for what a device says by itself.
+  explicit FarEnd(Answer answer)
+      : answer_(std::move(answer)), port_(open(far_end_device, O_RDWR | O_NOCTTY)) {
+    termios settings{};
+    tcgetattr(port_, &settings);
+    cfmakeraw(&settings);
+    cfsetspeed(&settings, B115200);
+    settings.c_cflag |= CLOCAL;
+    tcsetattr(port_, TCSANOW, &settings);
+    tcflush(port_, TCIOFLUSH);
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
+  FarEnd(const FarEnd&) = delete;
+  FarEnd& operator=(const FarEnd&) = delete;
+  ~FarEnd() {
+    thread_.request_stop();
+    thread_.join();
+    close(port_);
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    std::array<std::uint8_t, 256> buffer{};
+    while (!stop.stop_requested()) {
+      pollfd polled{port_, POLLIN, 0};
+      poll(&polled, 1, 5);
+      const ssize_t count = (polled.revents & POLLIN) != 0 ? read(port_, buffer.data(), buffer.size()) : 0;
+      const auto answer = answer_(std::span(buffer).first(count > 0 ? static_cast<std::size_t>(count) : 0));
+      for (std::size_t sent = 0; sent < answer.size();) {
+        const ssize_t written = write(port_, answer.data() + sent, answer.size() - sent);
+        if (written <= 0) break;
+        sent += static_cast<std::size_t>(written);
+      }
+    }
+  }
+
+  Answer answer_;
+  int port_;
+  std::jthread thread_;
+};
+
+std::vector<std::uint8_t> echo(std::span<const std::uint8_t> bytes) {
+  return {bytes.begin(), bytes.end()};
+}
+
+/// The hand on the plug: the hub's port is switched off and on.
+class Plug {
+ public:
+  Plug() {
+    const auto devices = list_ftdi_devices();
+    if (devices.size() != 1) return;
+    const std::string path = "/sys/bus/usb/devices/" + devices.front().bus_path + "/port";
+    port_ = std::filesystem::canonical(path) / "disable";
+  }
+  ~Plug() { in(); }
+  void out() const { std::ofstream(port_) << "1" << std::flush; }
+  void in() const { std::ofstream(port_) << "0" << std::flush; }
+
+ private:
+  std::filesystem::path port_;
+};
+
+bool eventually(const std::function<bool()>& condition) {
+  const auto patience = std::chrono::steady_clock::now() + slowness * 10s;
+  while (std::chrono::steady_clock::now() < patience) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(10ms);
+  }
+  return false;
+}
+
+std::size_t open_descriptors() {
+  std::size_t count = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) ++count;
+  return count;
+}
+
+std::size_t resident_kib() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;)
+    if (word == "VmRSS:") {
+      std::size_t kib = 0;
+      status >> kib;
+      return kib;
+    }
+  return 0;
+}
+
+/// A cycle takes a second or two; EIGENPOSE_CYCLES sets how many there are.
+int cycles() {
+  const char* number = std::getenv("EIGENPOSE_CYCLES");
+  return number != nullptr ? std::atoi(number) : 20;
+}
+
+class FtdiChip : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::getenv("EIGENPOSE_IN_GUEST") == nullptr)
+      GTEST_SKIP() << "only in the guest: tests/guest/run --ftdi --udev";
+    ASSERT_TRUE(eventually([] { return list_ftdi_devices().size() == 1; }));
+  }
+  TimePoint soon() const { return clock_.now() + slowness * 5s; }
+
+  /// Writes and reads back through the far end. @return what came back.
+  std::vector<std::uint8_t> there_and_back(FtdiLink& link, const std::vector<std::uint8_t>& bytes) {
+    link.write(bytes, soon());
+    std::vector<std::uint8_t> back;
+    std::array<std::uint8_t, 64> buffer{};
+    while (back.size() < bytes.size()) {
+      const std::size_t count = link.read(buffer, soon());
+      if (count == 0) break;
+      back.insert(back.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+    return back;
+  }
+
+  SteadyClock clock_;
+};
+
+TEST_F(FtdiChip, IsListedWithItsNumbersAndPlace) {
+  const FtdiDevice device = list_ftdi_devices().front();
+  EXPECT_EQ(device.vendor, 0x0403);
+  EXPECT_EQ(device.product, 0x6001);
+  EXPECT_TRUE(device.accessible);
+  EXPECT_FALSE(device.bus_path.empty());
+  EXPECT_FALSE(device.name.empty());
+}
+
+TEST_F(FtdiChip, CarriesBytesBothWaysWithoutItsStatusBytes) {
+  const FarEnd far_end(echo);
+  FtdiLink link({}, clock_);
+  link.reopen(soon());
+  for (const std::size_t length : {1U, 61U, 62U, 63U, 64U, 200U}) {  // around the chip's packet of 62 and two
+    std::vector<std::uint8_t> bytes(length);
+    for (std::size_t i = 0; i < length; ++i) bytes[i] = static_cast<std::uint8_t>(i * 7 + length);
+    EXPECT_EQ(there_and_back(link, bytes), bytes) << length;
+  }
+}
+
+TEST_F(FtdiChip, WaitsNoLongerThanTheDeadline) {
+  FtdiLink link({}, clock_);
+  link.reopen(soon());
+  link.discard_input();
+  std::array<std::uint8_t, 8> buffer{};
+  const TimePoint start = clock_.now();
+  EXPECT_EQ(link.read(buffer, start + 50ms), 0U);
+  EXPECT_GE(clock_.now() - start, 50ms);
+  EXPECT_LT(clock_.now() - start, slowness * 1s);
+}
+
+TEST_F(FtdiChip, IsFoundByItsSerialNumberAndNoOther) {
+  const std::string serial = list_ftdi_devices().front().serial;
+  ASSERT_FALSE(serial.empty());
+  FtdiLink right({.serial = serial}, clock_);
+  EXPECT_NO_THROW(right.reopen(soon()));
+  FtdiLink wrong({.serial = serial + "X"}, clock_);
+  EXPECT_THROW(wrong.reopen(clock_.now()), DeviceLost);
+}
+
+TEST_F(FtdiChip, GivesTheKernelItsDriverBack) {
+  const std::filesystem::path tty = "/dev/ttyUSB0";
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(tty); })) << "ftdi_sio has not taken the chip";
+  {
+    FtdiLink link({}, clock_);
+    link.reopen(soon());
+    EXPECT_TRUE(eventually([&] { return !std::filesystem::exists(tty); })) << "ftdi_sio was not detached";
+  }
+  EXPECT_TRUE(eventually([&] { return std::filesystem::exists(tty); })) << "ftdi_sio was not given back";
+}
+
+TEST_F(FtdiChip, CannotBeTakenTwice) {
+  FtdiLink first({}, clock_);
+  first.reopen(soon());
+  FtdiLink second({}, clock_);
+  try {
+    second.reopen(clock_.now());
+    FAIL() << "two links on one chip";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("in use"));
+  }
+}
+
+TEST_F(FtdiChip, IsLostInTheMiddleOfAReadAndWorksAgainWhenItIsBack) {
+  const FarEnd far_end(echo);
+  const Plug plug;
+  FtdiLink link({}, clock_);
+  link.reopen(soon());
+  std::jthread hand([&] {
+    std::this_thread::sleep_for(100ms);  // into the read
+    plug.out();
+  });
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_THROW(link.read(buffer, soon()), DeviceLost);
+  hand.join();
+  EXPECT_THROW(link.write(std::vector<std::uint8_t>{1}, soon()), DeviceLost);
+  EXPECT_THROW(link.reopen(clock_.now() + 100ms), DeviceError);
+  plug.in();
+  link.reopen(soon());
+  const std::vector<std::uint8_t> bytes = {1, 2, 3};
+  EXPECT_EQ(there_and_back(link, bytes), bytes);
+}
+
+TEST_F(FtdiChip, IsUnpluggedAndRepluggedManyTimesWithoutALeak) {
+  const FarEnd far_end(echo);
+  const Plug plug;
+  FtdiLink link({}, clock_);
+  link.reopen(soon());
+  std::size_t descriptors = 0;
+  std::size_t memory_kib = 0;
+  Duration longest{};
+  for (int cycle = 0; cycle < cycles(); ++cycle) {
+    plug.out();
+    std::array<std::uint8_t, 8> buffer{};
+    ASSERT_THROW(
+        {
+          while (true) link.read(buffer, soon());
+        },
+        DeviceLost)
+        << cycle;
+    plug.in();
+    ASSERT_TRUE(eventually([] { return !list_ftdi_devices().empty(); })) << cycle;
+    const TimePoint back = clock_.now();
+    link.reopen(soon());
+    const std::vector<std::uint8_t> bytes = {static_cast<std::uint8_t>(cycle), 0x55};
+    ASSERT_EQ(there_and_back(link, bytes), bytes) << cycle;
+    longest = std::max(longest, clock_.now() - back);
+    if (cycle == 9) {  // after what the libraries keep for good
+      descriptors = open_descriptors();
+      memory_kib = resident_kib();
+    }
+  }
+  EXPECT_LT(longest, slowness * return_time);
+  EXPECT_EQ(open_descriptors(), descriptors);
+  EXPECT_LT(resident_kib(), memory_kib + 512);
+  RecordProperty("longest_recovery_ms",
+                 static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(longest).count()));
+  std::printf("longest recovery %lld ms\n",
+              static_cast<long long>(std::chrono::duration_cast<std::chrono::milliseconds>(longest).count()));
+}
+
+TEST_F(FtdiChip, CarriesAnAptStageThroughAnUnplugInTheMiddleOfAMove) {
+  sim::SimLab lab(clock_);
+  sim::AptController controller(lab, {});
+  const FarEnd far_end([&](std::span<const std::uint8_t> bytes) {
+    return bytes.empty() ? controller.spontaneous() : controller.receive(bytes);
+  });
+  const Plug plug;
+  AptAxisOptions options;
+  options.stage = apt_stage("PRM1-Z8");
+  options.speed = 20.0;
+  options.acceleration = 200.0;
+  options.patience.start_time = 2s;
+  options.patience.settle_time = 2s;
+  options.response_timeout = 1s;
+  AptAxis axis(options, std::make_unique<FtdiLink>(FtdiLinkOptions{}, clock_), clock_);
+  axis.home(clock_.now() + 60s, {});
+  EXPECT_NEAR(axis.move_to(5.0, clock_.now() + 60s, {}), 5.0, 0.02);
+
+  std::jthread hand([&] {
+    const double start = lab.axis_position_deg(sim::LabAxis::arm_azimuth, clock_.now());
+    while (lab.axis_position_deg(sim::LabAxis::arm_azimuth, clock_.now()) < start + 1.0)
+      std::this_thread::sleep_for(1ms);
+    plug.out();
+  });
+  EXPECT_THROW(axis.move_to(60.0, clock_.now() + 60s, {}), DeviceError);
+  hand.join();
+  plug.in();
+  ASSERT_TRUE(eventually([] { return !list_ftdi_devices().empty(); }));
+  axis.home(clock_.now() + 60s, {});
+  EXPECT_NEAR(axis.move_to(10.0, clock_.now() + 60s, {}), 10.0, 0.02);
+  EXPECT_NEAR(lab.axis_position_deg(sim::LabAxis::arm_azimuth, clock_.now()), 10.0, 0.02);
+}
+
+}  // namespace
+}  // namespace eigenpose
