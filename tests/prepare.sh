@@ -15,7 +15,7 @@ build_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
 )
 # Independent peers that the tests talk to.
-test_packages=(mbpoll python3-pymodbus socat)
+test_packages=(mbpoll python3-pymodbus python3-serial python3-serial-asyncio socat)
 
 say() { printf '\n\033[1m== %s\033[0m\n' "$*"; }
 fail() { printf '\n%s\n' "$*" >&2; exit 1; }
