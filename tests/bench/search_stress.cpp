@@ -1,6 +1,6 @@
 // Every search against the oracle, on many queries.
 //
-//   search_stress [queries] [threads]     (10 million, all cores)
+//   search_stress [queries] [threads] [seed]     (10 million, all cores, 0)
 //
 // Lists of a few manifolds with random K, samples, degrees, closed and open, uniform and jittered, twins
 // among them; queries near, far, on knots, at seams and between two manifolds. One list in 500 has two DOFs.
@@ -109,6 +109,7 @@ int main(int count, char** arguments) {
   using namespace eigenpose;
   const std::size_t wanted = count > 1 ? std::strtoul(arguments[1], nullptr, 10) : 10'000'000;
   const auto threads = static_cast<unsigned>(count > 2 ? std::strtoul(arguments[2], nullptr, 10) : 0);
+  const auto seed = static_cast<unsigned>(count > 3 ? std::strtoul(arguments[3], nullptr, 10) : 0);
   Tally tally;
   const char* datasets = std::getenv("EIGENPOSE_DATASETS");
   if (datasets != nullptr && *datasets != '\0') {
@@ -116,7 +117,7 @@ int main(int count, char** arguments) {
     const bench::SearchWorld world = bench::coil_world(std::filesystem::path(datasets) / "coil-100-half", 40,
                                                        std::max<std::size_t>(real / 3, 1));
     parallel_for(3, threads, [&](std::size_t part) {
-      std::mt19937 random(static_cast<unsigned>(part));
+      std::mt19937 random(1'000'000 * seed + static_cast<unsigned>(part));
       std::normal_distribution<float> normal(0.0F, 0.003F);
       Comparison comparison(world.manifolds, tally);
       for (Eigen::VectorXf point : part == 0 ? world.known : part == 1 ? world.perturbed : world.unknown) {
@@ -131,7 +132,7 @@ int main(int count, char** arguments) {
   const std::size_t lists =
       (wanted - std::min(wanted, tally.queries.load()) + queries_per_list - 1) / queries_per_list;
   parallel_for(lists, threads, [&](std::size_t i) {
-    std::mt19937 random(static_cast<unsigned>(1000 + i));
+    std::mt19937 random(1'000'000 * seed + static_cast<unsigned>(1000 + i));
     const auto curves = random_list(1, random);
     Comparison on_curves(curves, tally);
     for (std::size_t k = 0; k < queries_per_list; ++k)
