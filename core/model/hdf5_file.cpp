@@ -147,6 +147,32 @@ void Hdf5Group::write(const std::string& dataset, const Eigen::MatrixXd& matrix)
   write_dataset(handle_.get(), dataset, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, matrix);
 }
 
+void Hdf5Group::write(const std::string& dataset, const std::vector<std::int8_t>& bytes) const {
+  const hsize_t size = bytes.size();
+  const std::string what = "cannot write \"" + dataset + "\"; is the disk full?";
+  const Hdf5Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose, what);
+  const Hdf5Handle data(H5Dcreate2(handle_.get(), dataset.c_str(), H5T_STD_I8LE, space.get(), H5P_DEFAULT,
+                                   H5P_DEFAULT, H5P_DEFAULT),
+                        H5Dclose, what);
+  check(H5Dwrite(data.get(), H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), what);
+}
+
+std::vector<std::int8_t> Hdf5Group::read_bytes(const std::string& dataset) const {
+  const std::string what = "has no bytes \"" + dataset + "\"";
+  const Hdf5Handle data(H5Dopen2(handle_.get(), dataset.c_str(), H5P_DEFAULT), H5Dclose, what);
+  const Hdf5Handle space(H5Dget_space(data.get()), H5Sclose, what);
+  hsize_t size = 0;
+  if (H5Sget_simple_extent_ndims(space.get()) != 1) throw Hdf5Failure(what);
+  H5Sget_simple_extent_dims(space.get(), &size, nullptr);
+  std::vector<std::int8_t> bytes(size);
+  check(H5Dread(data.get(), H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), what);
+  return bytes;
+}
+
+bool Hdf5Group::has_group(const std::string& name) const {
+  return H5Lexists(handle_.get(), name.c_str(), H5P_DEFAULT) > 0;
+}
+
 Eigen::MatrixXf Hdf5Group::read_floats(const std::string& dataset) const {
   return read_dataset<Eigen::MatrixXf>(handle_.get(), dataset, H5T_NATIVE_FLOAT);
 }

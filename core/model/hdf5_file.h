@@ -69,6 +69,9 @@ class Hdf5Group {
   /// rows.
   void write(const std::string& dataset, const Eigen::MatrixXf& matrix) const;
   void write(const std::string& dataset, const Eigen::MatrixXd& matrix) const;
+  void write(const std::string& dataset, const std::vector<std::int8_t>& bytes) const;
+  [[nodiscard]] std::vector<std::int8_t> read_bytes(const std::string& dataset) const;
+  [[nodiscard]] bool has_group(const std::string& name) const;
   [[nodiscard]] Eigen::MatrixXf read_floats(const std::string& dataset) const;
   [[nodiscard]] Eigen::MatrixXd read_doubles(const std::string& dataset) const;
 

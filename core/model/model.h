@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "core/image/normalization.h"
 #include "core/manifold/manifold.h"
 #include "core/model/object_space.h"
+#include "core/parts/parts_model.h"
 #include "core/subspace/eigenspace.h"
 
 namespace eigenpose {
@@ -49,6 +51,8 @@ struct Model {
   NormalizationOptions normalization;
   Eigenspace eigenspace;
   std::vector<ModelObject> objects;
+  /// Windows and pose spaces, in the order of `objects`; null where only the whole region is matched.
+  std::shared_ptr<const PartsModel> parts;
   Provenance provenance;
 };
 

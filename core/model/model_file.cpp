@@ -16,6 +16,7 @@
 #include "core/base/error.h"
 #include "core/image/picture_file.h"
 #include "core/model/hdf5_file.h"
+#include "core/model/parts_file.h"
 
 namespace eigenpose {
 namespace {
@@ -187,6 +188,7 @@ void write_content(const Model& model, const std::filesystem::path& part) {
   const Hdf5Group objects = root.make_group("objects");
   for (std::size_t i = 0; i < model.objects.size(); ++i)
     write_object(objects.make_group(numbered(i)), model.objects[i]);
+  if (model.parts) write_parts(root.make_group("parts"), *model.parts);
   const Hdf5Group provenance = root.make_group("provenance");
   provenance.write("program_version", model.provenance.program_version);
   provenance.write("created", model.provenance.created);
@@ -205,6 +207,8 @@ Model read_content(std::span<unsigned char> bytes) {
   const Hdf5Group objects = root.open_group("objects");
   for (const std::string& name : objects.group_names())
     model.objects.push_back(read_object(objects.open_group(name)));
+  if (root.has_group("parts"))
+    model.parts = std::make_shared<const PartsModel>(read_parts(root.open_group("parts"), model.objects));
   const Hdf5Group provenance = root.open_group("provenance");
   model.provenance.program_version = provenance.read_text("program_version");
   model.provenance.created = provenance.read_text("created");

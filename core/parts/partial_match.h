@@ -41,6 +41,10 @@ struct VotingOptions {
   float floor_weight = 0.05F;  ///< weight of a window without any gradient
 };
 
+/// A window whose κ for the right view is below this shows something else: a cover, a neighbour, another
+/// object.
+inline constexpr float foreign_likeness = 0.3F;
+
 /// Votes for one object.
 struct PartialVote {
   std::size_t object = 0;

@@ -27,7 +27,7 @@ struct PartsLearningOptions {
   unsigned threads = 0;
 };
 
-/// Learns windows and pose spaces. Rejection scores are left empty: see calibrate_parts.
+/// Learns windows and pose spaces. Thresholds come from calibrate_parts.
 /// @throws std::invalid_argument without objects or views; Interrupted.
 PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
                        const Progress& progress = {}, std::stop_token stop = {});

@@ -14,12 +14,11 @@
 
 namespace eigenpose {
 
-/// How far an object's own views may lie from what was learned of it: scores of left-out and of moved learned
-/// views. A score is the share of window votes that the best pose does not get, after alignment: 0 is
-/// perfect, 1 nothing in common.
+/// What an object's own views say of how well it is matched: see calibrate_parts. A score is the share of
+/// window votes that the best pose does not get, after alignment: 0 is perfect, 1 nothing in common.
 struct PartsCalibration {
-  std::vector<double> scores;    ///< ascending, one a learned view (or its substitute)
   double rejection_score = 1.0;  ///< a region with a larger score is unknown
+  double typical_score = 0.1;    ///< mean score of the object's own views
   double covered_share = 0.1;    ///< a region with a larger share of foreign windows is taken as covered
 };
 
@@ -34,6 +33,9 @@ struct PartsModel {
   std::vector<PartsObject> objects;
   std::vector<PoseSpace> poses;               ///< one an object
   std::vector<PartsCalibration> calibration;  ///< one an object
+
+  /// The smallest rate of wrong rejections that the number of learned views can support, 1/(n + 1).
+  double smallest_rate = 1.0;
 
   /// Bytes held for one object.
   [[nodiscard]] std::size_t memory(std::size_t object) const {

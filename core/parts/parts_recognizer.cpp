@@ -15,7 +15,6 @@ constexpr double window_count = QueryWindows::count;  // each window counts as o
 constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
 constexpr std::size_t most_revoted = 3;
 constexpr std::size_t most_covered_poses = 3;
-constexpr float foreign_likeness = 0.3F;   // a window less alike than this is foreign to the object
 constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 

@@ -38,7 +38,7 @@ struct Misalignment {
 
 /// One scale of a pose space.
 struct PoseScale {
-  int side = 0;           ///< pixels a side: 32 (coarse) or 64 (fine)
+  int side = 0;           ///< pixels a side: 32 (coarse) or 48 (fine)
   Eigen::MatrixXf basis;  ///< side² × D
   Eigen::VectorXf mean;   ///< basisᵀ · mean picture, D
 
@@ -57,6 +57,10 @@ class PoseSpace {
   /// fastest).
   /// @throws std::invalid_argument for fewer than two views or sizes that do not fit.
   static PoseSpace learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views);
+
+  /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
+  static PoseSpace from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,
+                              Manifold coarse_manifold, Manifold fine_manifold);
 
   [[nodiscard]] const PoseScale& coarse() const { return coarse_; }
   /// Mean picture of the coarse scale, 32² pixels.

@@ -31,39 +31,53 @@ QueryWindow quantize_query(const float* coordinates, const WindowScale& scale) {
 WindowStore::WindowStore(const std::vector<Eigen::MatrixXf>& views, const WindowScale& scale)
     : views_(views.size()) {
   constexpr std::size_t positions = WindowGrid::positions;
-  const std::size_t lanes = groups() * group;
-  values_.assign(positions * lanes * dims, 0);
-  biases_.assign(positions * lanes, no_view);
+  values_.assign(positions * groups() * block_bytes, 0);
   for (std::size_t v = 0; v < views_; ++v) {
     if (views[v].rows() != WindowGrid::components || views[v].cols() != WindowGrid::positions) {
       throw std::invalid_argument("a view has 32×289 window coordinates, not " +
                                   std::to_string(views[v].rows()) + "×" + std::to_string(views[v].cols()));
     }
     for (std::size_t p = 0; p < positions; ++p) {
-      const std::size_t block = p * groups() + v / group;
-      std::int32_t sum = 0;
-      float energy = 0.0F;
       for (std::size_t k = 0; k < dims; ++k) {
         const float coordinate = views[v](static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(p));
         const float step = std::clamp(std::nearbyint(coordinate / scale.learned), -127.0F, 127.0F);
-        values_[block * block_bytes + k / 4 * 32 + v % group * 4 + k % 4] = static_cast<std::int8_t>(step);
-        sum += static_cast<std::int32_t>(step);
-        energy += step * step;
+        values_[value_index(p, v, k)] = static_cast<std::int8_t>(step);
       }
-      const float half_energy = 0.5F * energy * scale.learned / scale.query;
-      biases_[block * group + v % group] = 64 * sum + static_cast<std::int32_t>(std::lround(half_energy));
     }
   }
+  make_biases(scale);
 }
 
-WindowStore::WindowStore(std::size_t views, std::vector<std::int8_t> values, std::vector<std::int32_t> biases)
-    : views_(views), values_(std::move(values)), biases_(std::move(biases)) {
-  const std::size_t lanes = groups() * group * WindowGrid::positions;
-  if (values_.size() != lanes * dims || biases_.size() != lanes) {
+WindowStore::WindowStore(std::size_t views, std::vector<std::int8_t> values, const WindowScale& scale)
+    : views_(views), values_(std::move(values)) {
+  const std::size_t expected = groups() * block_bytes * WindowGrid::positions;
+  if (values_.size() != expected) {
     throw std::invalid_argument("the windows of " + std::to_string(views) + " views take " +
-                                std::to_string(lanes * dims) + " bytes and " + std::to_string(lanes) +
-                                " biases, not " + std::to_string(values_.size()) + " and " +
-                                std::to_string(biases_.size()));
+                                std::to_string(expected) + " bytes, not " + std::to_string(values_.size()));
+  }
+  make_biases(scale);
+}
+
+std::size_t WindowStore::value_index(std::size_t position, std::size_t view, std::size_t dimension) const {
+  const std::size_t block = position * groups() + view / group;
+  return block * block_bytes + dimension / 4 * 32 + view % group * 4 + dimension % 4;
+}
+
+void WindowStore::make_biases(const WindowScale& scale) {
+  biases_.assign(WindowGrid::positions * groups() * group, no_view);
+  for (std::size_t p = 0; p < WindowGrid::positions; ++p) {
+    for (std::size_t v = 0; v < views_; ++v) {
+      std::int32_t sum = 0;
+      std::int32_t energy = 0;
+      for (std::size_t k = 0; k < dims; ++k) {
+        const std::int32_t step = values_[value_index(p, v, k)];
+        sum += step;
+        energy += step * step;
+      }
+      const float half_energy = 0.5F * static_cast<float>(energy) * scale.learned / scale.query;
+      biases_[(p * groups() + v / group) * group + v % group] =
+          64 * sum + static_cast<std::int32_t>(std::lround(half_energy));
+    }
   }
 }
 

@@ -49,13 +49,12 @@ class WindowStore {
   /// @param views one 32×289 matrix a view: the coordinates of its windows, row by row.
   WindowStore(const std::vector<Eigen::MatrixXf>& views, const WindowScale& scale);
   /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
-  WindowStore(std::size_t views, std::vector<std::int8_t> values, std::vector<std::int32_t> biases);
+  WindowStore(std::size_t views, std::vector<std::int8_t> values, const WindowScale& scale);
 
   static constexpr std::size_t group = 8;  ///< views compared together
   [[nodiscard]] std::size_t views() const { return views_; }
   [[nodiscard]] std::size_t groups() const { return (views_ + group - 1) / group; }
   [[nodiscard]] const std::vector<std::int8_t>& values() const { return values_; }
-  [[nodiscard]] const std::vector<std::int32_t>& biases() const { return biases_; }
   [[nodiscard]] std::size_t memory() const { return values_.size() + biases_.size() * sizeof(std::int32_t); }
 
   /// For each view (rounded up to whole groups) the largest q·m − ½‖m‖² − ½·penalty over the windows within
@@ -65,6 +64,9 @@ class WindowStore {
                    const WindowScale& scale, std::int32_t* scores) const;
 
  private:
+  [[nodiscard]] std::size_t value_index(std::size_t position, std::size_t view, std::size_t dimension) const;
+  void make_biases(const WindowScale& scale);
+
   std::size_t views_ = 0;
   std::vector<std::int8_t> values_;   ///< [289][groups][8 × 4 dimensions][8 views][4]
   std::vector<std::int32_t> biases_;  ///< [289][groups][8 views]

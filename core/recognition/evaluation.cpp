@@ -1,11 +1,16 @@
 #include "core/recognition/evaluation.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <mutex>
+#include <numbers>
 #include <numeric>
+#include <random>
 #include <stdexcept>
+
+#include <opencv2/imgproc.hpp>
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
@@ -44,9 +49,11 @@ void add(RecognitionTimes& sum, const RecognitionTimes& part) {
   sum.total += part.total;
 }
 
-Answer recognize_one(Worker& worker, const ImageSet& set, std::size_t view) {
+Answer recognize_one(Worker& worker, const ImageSet& set, std::size_t view, const TestDamage& damage,
+                     std::size_t index) {
   const TimePoint began = std::chrono::steady_clock::now();
-  const cv::Mat image = set.load(view);
+  cv::Mat image = set.load(view);
+  if (damage.any()) image = damaged(image, damage, index);
   worker.load_time += std::chrono::steady_clock::now() - began;
   RecognitionTimes times;
   const auto outcomes = worker.recognizer.recognize(image, &times);
@@ -82,7 +89,78 @@ void count(EvaluationReport& report, ObjectEvaluation& object, const Answer& ans
   }
 }
 
+/// The model without one of its objects.
+std::shared_ptr<const Model> without_object(const Model& model, std::size_t object) {
+  auto rest = std::make_shared<Model>(model);
+  const auto at = static_cast<std::ptrdiff_t>(object);
+  rest->objects.erase(rest->objects.begin() + at);
+  if (model.parts) {
+    auto parts = std::make_shared<PartsModel>(*model.parts);
+    parts->objects.erase(parts->objects.begin() + at);
+    parts->poses.erase(parts->poses.begin() + at);
+    parts->calibration.erase(parts->calibration.begin() + at);
+    rest->parts = std::move(parts);
+  }
+  return rest;
+}
+
+/// Shows every test view to a model without its object.
+void show_strangers(const std::shared_ptr<const Model>& model, std::span<const ImageSet> sets,
+                    std::span<const Test> tests, const EvaluationOptions& options, EvaluationReport& report,
+                    const Progress& progress, const std::stop_token& stop) {
+  if (sets.size() < 2)
+    throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
+  std::vector<std::size_t> accepted(sets.size(), 0);
+  std::vector<std::size_t> shown(sets.size(), 0);
+  std::atomic<std::size_t> done = 0;
+  parallel_for(sets.size(), options.threads, [&](std::size_t s) {
+    Worker worker(without_object(*model, s));
+    for (std::size_t i = 0; i < tests.size(); ++i) {
+      if (tests[i].set != s) continue;
+      if (stop.stop_requested()) throw Interrupted();
+      const Answer answer = recognize_one(worker, sets[s], tests[i].view, options.damage, i);
+      ++shown[s];
+      if (answer.verdict == Verdict::recognized || answer.verdict == Verdict::ambiguous) ++accepted[s];
+    }
+    if (progress) progress({"showing strangers", ++done, sets.size()});
+  });
+  report.strangers = std::accumulate(shown.begin(), shown.end(), std::size_t{0});
+  report.false_accepts = std::accumulate(accepted.begin(), accepted.end(), std::size_t{0});
+}
+
 }  // namespace
+
+cv::Mat damaged(const cv::Mat& picture, const TestDamage& damage, std::size_t index) {
+  // std::uniform_real_distribution differs between libraries; the generator does not.
+  std::mt19937 random(damage.seed * 1000003U + static_cast<unsigned>(index));
+  const auto each_way = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
+  const double dx = damage.shift * each_way() * picture.cols / 128.0;
+  const double dy = damage.shift * each_way() * picture.cols / 128.0;
+  const double scale = 1.0 + damage.scale * each_way();
+  const double turn = damage.rotation_deg * each_way() * std::numbers::pi / 180.0;
+  const double across = 0.5 * (each_way() + 1.0);
+  const double down = 0.5 * (each_way() + 1.0);
+  cv::Mat result;
+  if (damage.shift > 0 || damage.scale > 0 || damage.rotation_deg > 0) {
+    const double cosine = scale * std::cos(turn);
+    const double sine = scale * std::sin(turn);
+    const double x = 0.5 * picture.cols - 0.5;
+    const double y = 0.5 * picture.rows - 0.5;
+    const cv::Matx23d map(cosine, -sine, x + dx - cosine * x + sine * y, sine, cosine,
+                          y + dy - sine * x - cosine * y);
+    cv::warpAffine(picture, result, map, picture.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  } else {
+    result = picture.clone();
+  }
+  if (damage.occlusion > 0) {
+    const int side =
+        static_cast<int>(std::lround(std::sqrt(damage.occlusion) * std::min(picture.cols, picture.rows)));
+    const cv::Rect cover(static_cast<int>(across * (picture.cols - side)),
+                         static_cast<int>(down * (picture.rows - side)), side, side);
+    result(cover & cv::Rect(0, 0, picture.cols, picture.rows)).setTo(cv::Scalar::all(0));
+  }
+  return result;
+}
 
 ViewSplit split_views(const ImageSet& set, std::size_t learn_every, std::size_t offset) {
   if (learn_every < 2 || offset >= learn_every)
@@ -155,7 +233,7 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
   parallel_for(threads, threads, [&](std::size_t t) {
     for (std::size_t i = t; i < tests.size(); i += threads) {
       if (stop.stop_requested()) throw Interrupted();
-      answers[i] = recognize_one(workers[t], sets[tests[i].set], tests[i].view);
+      answers[i] = recognize_one(workers[t], sets[tests[i].set], tests[i].view, options.damage, i);
       const std::lock_guard lock(progress_mutex);
       if (progress) progress({"recognising", ++done, tests.size()});
     }
@@ -165,6 +243,12 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
     add(report.times, worker.spent);
     report.load_time += worker.load_time;
   }
+  if (model->parts) {
+    report.smallest_rate = model->parts->smallest_rate;
+    for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->parts->memory(o);
+    report.model_bytes /= model->objects.size();
+  }
+  if (options.leave_one_out) show_strangers(model, sets, tests, options, report, progress, stop);
   return report;
 }
 

@@ -17,12 +17,31 @@
 
 namespace eigenpose {
 
+/// What is done to test pictures before they are recognised. Every picture has its own draw, from the seed
+/// and its number.
+struct TestDamage {
+  double shift = 0.0;         ///< each way in x and in y, pixels of a picture 128 wide
+  double scale = 0.0;         ///< each way: 0.03 is ±3 %
+  double rotation_deg = 0.0;  ///< each way, in the picture's plane
+  double occlusion = 0.0;     ///< share of the picture covered by a black square at a random place; below 1
+  unsigned seed = 1;
+
+  [[nodiscard]] bool any() const { return shift > 0 || scale > 0 || rotation_deg > 0 || occlusion > 0; }
+};
+
+/// The damaged picture of test number `index`.
+cv::Mat damaged(const cv::Mat& picture, const TestDamage& damage, std::size_t index);
+
 struct EvaluationOptions {
   /// Learn every k-th value of the first DOF, counted from `offset` in ascending order; test on the rest. At
   /// least 2.
   std::size_t learn_every = 2;
   std::size_t offset = 0;  ///< below learn_every
   LearningOptions learning;
+  TestDamage damage;
+  /// Also show the test views of every object to a model that does not hold it: they are strangers. The
+  /// object is taken out of the learned model; eigenspaces and thresholds stay as learned with all.
+  bool leave_one_out = false;
   unsigned threads = 0;
 };
 
@@ -50,6 +69,10 @@ struct EvaluationReport {
   std::size_t right = 0;
   std::size_t rejected = 0;
   std::size_t ambiguous = 0;
+  std::size_t strangers = 0;      ///< views shown to models without their object
+  std::size_t false_accepts = 0;  ///< of these, taken for another object
+  double smallest_rate = 1.0;     ///< of wrong rejections, that the learned views can support
+  std::size_t model_bytes = 0;    ///< of windows and pose spaces, mean of an object
 
   /// 0…1
   [[nodiscard]] double recognition_rate() const;

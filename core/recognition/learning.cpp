@@ -1,5 +1,6 @@
 #include "core/recognition/learning.h"
 
+#include <algorithm>
 #include <chrono>
 #include <ctime>
 #include <set>
@@ -40,6 +41,25 @@ void check_names(std::span<const TrainingSet> sets) {
     if (!names.insert(set.images->object()).second)
       throw Error("two image sets are of the object \"" + set.images->object() +
                   "\"; learn only one of them");
+}
+
+}  // namespace
+
+namespace {
+
+/// The pictures of a store, object by object, as partial matching learns them.
+std::vector<PartsViews> parts_views(const ViewStore& views) {
+  const int size = views.normalization().size;
+  const int type = appearance_bands(views.normalization()) == 3 ? CV_8UC3 : CV_8UC1;
+  std::vector<PartsViews> result;
+  for (const ObjectViews& object : views.objects())
+    result.push_back({object.axes, object.count, [&views, size, type, first = object.first](std::size_t i) {
+                        cv::Mat picture(size, size, type);
+                        const auto bytes = views.bytes(first + i);
+                        std::copy(bytes.begin(), bytes.end(), picture.ptr<std::uint8_t>());
+                        return picture;
+                      }});
+  return result;
 }
 
 }  // namespace
@@ -108,6 +128,16 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     spaces =
         learn_object_spaces(views, told.evidence, options.spline_degree, options.threads, progress, stop);
   told.object_space_time = watch.lap();
+  if (options.parts) {
+    const std::vector<PartsViews> pictures = parts_views(views);
+    PartsLearningOptions parts_options;
+    parts_options.threads = options.threads;
+    options.calibration.threads = options.threads;
+    PartsModel parts = learn_parts(pictures, parts_options, progress, stop);
+    calibrate_parts(parts, pictures, options.calibration, progress, stop);
+    model.parts = std::make_shared<const PartsModel>(std::move(parts));
+    told.parts_time = watch.lap();
+  }
 
   for (std::size_t o = 0; o < manifolds.size(); ++o) {
     const ObjectViews& object = views.objects()[o];

@@ -8,6 +8,7 @@
 
 #include "core/base/progress.h"
 #include "core/model/model.h"
+#include "core/parts/parts_calibration.h"
 #include "core/recognition/rejection.h"
 #include "core/recognition/view_store.h"
 #include "core/subspace/solver.h"
@@ -22,6 +23,10 @@ struct LearningOptions {
   /// Learn each object's own eigenspace too: for a second look where two objects are close, and for pose
   /// where it is better.
   bool object_spaces = true;
+  /// Learn windows and pose spaces too: matching that bears covers and misalignment. Without, only the whole
+  /// region is matched.
+  bool parts = true;
+  PartsCalibrationOptions calibration;
   unsigned threads = 0;  ///< 0: all cores. The model does not depend on it.
   /// Kept in the model's provenance.
   std::string image_sets;
@@ -37,6 +42,7 @@ struct LearningReport {
   Duration manifold_time{};
   Duration rejection_time{};
   Duration object_space_time{};
+  Duration parts_time{};  ///< windows, pose spaces and their calibration
   Duration total_time{};
 };
 

@@ -10,6 +10,7 @@
 #include "core/image/segmentation.h"
 #include "core/manifold/search.h"
 #include "core/recognition/own_spaces.h"
+#include "core/recognition/parts_stage.h"
 #include "core/recognition/pose_table.h"
 
 namespace eigenpose {
@@ -30,6 +31,10 @@ constexpr double poses_apart = 1.0 / 12.0;
 constexpr double second_look_ratio = 2.0;
 /// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.
 constexpr double least_side_share = 0.25;
+
+/// The whole region settles which object it is when the squared distance to the second is this many times
+/// larger.
+constexpr double sure_ratio = 1.0 / 0.3;
 
 /// Adds the time since it was made to a duration.
 class Lap {
@@ -76,6 +81,7 @@ struct Recognizer::Impl {
   std::vector<PoseTable> poses;  ///< one an object
   Eigen::VectorXf mean_point;    ///< basisᵀ mean
   double search_bound = 0.0;
+  std::optional<PartsStage> parts;
 
   // Scratch, reused from frame to frame.
   Eigen::VectorXf appearance;
@@ -98,6 +104,8 @@ struct Recognizer::Impl {
   /// is seen best.
   void look_again();
   void judge(Outcome& outcome);
+  /// The nearest object, if the whole region leaves no doubt of it.
+  [[nodiscard]] std::optional<std::size_t> sure_object() const;
   void estimate_pose(Outcome& outcome, const ClosestPoint& best);
 
   Outcome& next_outcome();
@@ -120,6 +128,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned)
   for (const Manifold& manifold : manifolds) poses.emplace_back(manifold);
   for (const ModelObject& object : model->objects)
     search_bound = std::max(search_bound, search_reach * object.rejection_distance);
+  if (model->parts) parts.emplace(*model);
 }
 
 std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
@@ -175,6 +184,15 @@ void Recognizer::Impl::look_again() {
   const ClosestPoint& own = seen[static_cast<std::size_t>(winner)];
   if (better_pose(closest[0]) && same_valley(model->objects[own.manifold].manifold, own, closest[0]))
     closest[0].q = own.q;
+}
+
+std::optional<std::size_t> Recognizer::Impl::sure_object() const {
+  const ClosestPoint& best = closest[0];
+  if (best.distance > model->objects[best.manifold].rejection_distance) return std::nullopt;
+  if (closest_count > 1 &&
+      closest[1].distance * closest[1].distance < sure_ratio * best.distance * best.distance)
+    return std::nullopt;
+  return best.manifold;
 }
 
 void Recognizer::Impl::judge(Outcome& outcome) {
@@ -303,8 +321,13 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
     {
       const Lap lap(spent.search);
       impl.find_closest();
-      impl.look_again();
-      impl.judge(outcome);
+      if (impl.parts) {
+        impl.parts->judge({impl.appearance.data(), static_cast<std::size_t>(impl.appearance.size())},
+                          impl.sure_object(), outcome);
+      } else {
+        impl.look_again();
+        impl.judge(outcome);
+      }
     }
   }
   return {impl.outcomes.data(), impl.outcome_count};

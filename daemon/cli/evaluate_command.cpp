@@ -1,6 +1,7 @@
 /// `eigenpose evaluate`: how well objects are told apart, measured on views that were not learned.
 
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "core/recognition/evaluation.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
@@ -26,13 +28,20 @@ reported as unknown or ambiguous is told beside it. Pose errors are over recogni
 Examples:
   eigenpose evaluate sets/coil-20 --learn-every 2 --components 20 --size 128
   eigenpose evaluate sets/coil-100 --learn-every 4 --color --json > result.json
-  eigenpose evaluate sets/coil-20 --objects obj1,obj5)";
+  eigenpose evaluate sets/coil-20 --objects obj1,obj5
+  eigenpose evaluate sets/coil-20 --perturb shift=2,scale=0.03,rotation=3 --seed 7
+  eigenpose evaluate sets/coil-20 --occlude 0.2 --leave-one-out)";
 
 struct Options {
   std::string sets;
   std::size_t learn_every = 2;
   std::size_t offset = 0;
   LearningArguments learning;
+  std::vector<std::string> perturb;
+  double occlude = 0.0;
+  unsigned seed = 1;
+  bool leave_one_out = false;
+  double rejection_rate = 0.001;
   bool as_json = false;
 };
 
@@ -74,6 +83,12 @@ json to_json(const EvaluationReport& report) {
           {"rejected_rate", static_cast<double>(report.rejected) / static_cast<double>(n)},
           {"ambiguous_rate", static_cast<double>(report.ambiguous) / static_cast<double>(n)},
           {"test_views", n},
+          {"strangers", report.strangers},
+          {"false_accept_rate", report.strangers == 0 ? json(nullptr)
+                                                      : json(static_cast<double>(report.false_accepts) /
+                                                             static_cast<double>(report.strangers))},
+          {"smallest_rejection_rate", report.smallest_rate},
+          {"model_bytes_per_object", report.model_bytes},
           {"learned_views", report.learning.views},
           {"solver", report.learning.solver.solver},
           {"components", report.learning.solver.components},
@@ -117,6 +132,10 @@ void print(const EvaluationReport& report) {
   std::printf("rejected    %.2f %% unknown, %.2f %% ambiguous\n",
               100.0 * static_cast<double>(report.rejected) / n,
               100.0 * static_cast<double>(report.ambiguous) / n);
+  if (report.strangers > 0)
+    std::printf("strangers   %.2f %% of %zu views of objects left out were taken for another\n",
+                100.0 * static_cast<double>(report.false_accepts) / static_cast<double>(report.strangers),
+                report.strangers);
   std::printf("eigenspace  %zu dimensions by %s, %.1f %% of the scatter\n", report.learning.solver.components,
               report.learning.solver.solver.c_str(), 100.0 * report.learning.solver.energy);
   std::printf("learning    %.0f ms: normalise %.0f, eigenspace %.0f, manifolds %.0f, rejection %.0f\n",
@@ -132,6 +151,30 @@ void print(const EvaluationReport& report) {
       micro_per_view(report.times.search, views), micro_per_view(report.load_time, views));
 }
 
+/// "shift=2,scale=0.03,rotation=3" and --occlude. @throws ConfigError for another name or a value out of
+/// range.
+TestDamage parse_damage(const Options& options) {
+  TestDamage damage;
+  damage.seed = options.seed;
+  damage.occlusion = options.occlude;
+  for (const std::string& item : options.perturb) {
+    const auto equals = item.find('=');
+    const std::string name = item.substr(0, equals);
+    char* end = nullptr;
+    const double value = equals == std::string::npos ? -1.0 : std::strtod(item.c_str() + equals + 1, &end);
+    double* field = name == "shift"      ? &damage.shift
+                    : name == "scale"    ? &damage.scale
+                    : name == "rotation" ? &damage.rotation_deg
+                                         : nullptr;
+    if (field == nullptr || end == nullptr || *end != '\0' || !(value >= 0.0) ||
+        (name == "scale" && value >= 1.0))
+      throw ConfigError("--perturb: \"" + item +
+                        "\" is not one of shift=PIXELS, scale=SHARE, rotation=DEGREES");
+    *field = value;
+  }
+  return damage;
+}
+
 int run(const Options& options, const std::stop_token& stop) {
   const auto sets = open_chosen_sets(options.sets, options.learning);
   EvaluationOptions evaluation;
@@ -139,6 +182,9 @@ int run(const Options& options, const std::stop_token& stop) {
   evaluation.offset = options.offset;
   evaluation.learning = learning_options(options.learning, sets, options.sets);
   evaluation.threads = options.learning.threads;
+  evaluation.damage = parse_damage(options);
+  evaluation.leave_one_out = options.leave_one_out;
+  evaluation.learning.calibration.rate = options.rejection_rate;
   ConsoleProgress progress;
   const EvaluationReport report = evaluate(sets, evaluation, progress.callback(), stop);
   progress.clear();
@@ -162,6 +208,21 @@ void add_evaluate_command(CLI::App& app, CommandLine& line) {
       ->capture_default_str();
   command->add_option("--offset", options->offset, "The first view that is learned")->capture_default_str();
   add_learning_options(*command, options->learning);
+  command
+      ->add_option(
+          "--perturb", options->perturb,
+          "Move test pictures at random, each way: shift=PIXELS (of 128), scale=SHARE, rotation=DEGREES")
+      ->delimiter(',');
+  command->add_option("--occlude", options->occlude, "Cover this share of test pictures with a black square")
+      ->check(CLI::Range(0.0, 0.9));
+  command->add_option("--seed", options->seed, "Seed of --perturb and --occlude")->capture_default_str();
+  command->add_flag("--leave-one-out", options->leave_one_out,
+                    "Also show each object to a model without it: strangers");
+  command
+      ->add_option("--rejection-rate", options->rejection_rate,
+                   "Share of known regions that may be called unknown (0…0.5)")
+      ->check(CLI::Range(0.0, 0.5))
+      ->capture_default_str();
   command->add_flag("--json", options->as_json, "Print the result as JSON");
   command->callback(
       [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });

@@ -40,7 +40,9 @@ TEST(WindowStore, FindsTheSquaredDistanceToTheNearestWindowWithinTheTolerance) {
     for (Eigen::Index i = 0; i < view.size(); ++i) view.data()[i] = normal(random);
   }
   const WindowScale scale = WindowScale::for_range(0.8F);
-  const WindowStore store(views, scale);
+  const WindowStore learned(views, scale);
+  // What a model file keeps is all there is.
+  const WindowStore store(views.size(), learned.values(), scale);
   Eigen::VectorXf query(WindowGrid::components);
   for (Eigen::Index i = 0; i < query.size(); ++i) query(i) = normal(random);
   const QueryWindow rounded = quantize_query(query.data(), scale);
@@ -67,8 +69,7 @@ TEST(WindowStore, FindsTheSquaredDistanceToTheNearestWindowWithinTheTolerance) {
 }
 
 TEST(WindowStore, RefusesSizesThatDoNotFit) {
-  EXPECT_THROW(WindowStore(3, std::vector<std::int8_t>(7), std::vector<std::int32_t>(9)),
-               std::invalid_argument);
+  EXPECT_THROW(WindowStore(3, std::vector<std::int8_t>(7), WindowScale{}), std::invalid_argument);
   EXPECT_THROW(WindowStore({Eigen::MatrixXf(3, 3)}, WindowScale{}), std::invalid_argument);
 }
 

@@ -1,0 +1,143 @@
+#include "core/model/parts_file.h"
+
+#include <array>
+#include <cstdio>
+
+namespace eigenpose {
+namespace {
+
+std::string numbered(std::size_t i) {
+  std::array<char, 24> text{};
+  std::snprintf(text.data(), text.size(), "%06zu", i);
+  return text.data();
+}
+
+void write_scale(const Hdf5Group& group, const PoseScale& scale, const Manifold& manifold) {
+  group.write("side", std::int64_t{scale.side});
+  group.write("basis", scale.basis);
+  group.write("mean", Eigen::MatrixXf(scale.mean));
+  group.write("degree", std::int64_t{manifold.degree()});
+  group.write("coefficients", manifold.coefficients());
+}
+
+PoseScale read_scale(const Hdf5Group& group) {
+  PoseScale scale;
+  scale.side = static_cast<int>(group.read_integer("side"));
+  scale.basis = group.read_floats("basis");
+  scale.mean = group.read_floats("mean");
+  return scale;
+}
+
+Manifold read_manifold(const Hdf5Group& group, const Manifold& like) {
+  const auto axes = like.axes();
+  return Manifold::from_coefficients({axes.begin(), axes.end()}, group.read_doubles("coefficients"),
+                                     static_cast<int>(group.read_integer("degree")));
+}
+
+void write_windows(const Hdf5Group& group, const PartsObject& object) {
+  // One row a candidate: view, mirrored, its two neighbours.
+  Eigen::MatrixXd candidates(4, static_cast<Eigen::Index>(object.candidates.size()));
+  for (std::size_t c = 0; c < object.candidates.size(); ++c) {
+    candidates.col(static_cast<Eigen::Index>(c)) << object.candidates[c].view,
+        object.candidates[c].mirrored ? 1.0 : 0.0, object.neighbours[c][0], object.neighbours[c][1];
+  }
+  group.write("candidates", candidates);
+  Eigen::MatrixXd lanes(1, static_cast<Eigen::Index>(object.lane_candidate.size()));
+  for (std::size_t i = 0; i < object.lane_candidate.size(); ++i) {
+    lanes(0, static_cast<Eigen::Index>(i)) = object.lane_candidate[i];
+  }
+  group.write("lanes", lanes);
+  group.write("windows", object.store.values());
+}
+
+PartsObject read_windows(const Hdf5Group& group, const WindowScale& scale) {
+  PartsObject object;
+  const Eigen::MatrixXd candidates = group.read_doubles("candidates");
+  const Eigen::MatrixXd lanes = group.read_doubles("lanes");
+  if (candidates.rows() != 4 || candidates.cols() == 0 || lanes.rows() != 1) {
+    throw Hdf5Failure("has windows that do not fit together");
+  }
+  const auto count = static_cast<int>(candidates.cols());
+  for (int c = 0; c < count; ++c) {
+    object.candidates.push_back({static_cast<int>(candidates(0, c)), candidates(1, c) != 0.0});
+    object.neighbours.push_back({static_cast<int>(candidates(2, c)), static_cast<int>(candidates(3, c))});
+    for (const int neighbour : object.neighbours.back()) {
+      if (neighbour < -1 || neighbour >= count) {
+        throw Hdf5Failure("has windows that do not fit together");
+      }
+    }
+  }
+  for (Eigen::Index i = 0; i < lanes.cols(); ++i) {
+    if (lanes(0, i) < 0.0 || lanes(0, i) >= count) {
+      throw Hdf5Failure("has windows that do not fit together");
+    }
+    object.lane_candidate.push_back(static_cast<std::uint16_t>(lanes(0, i)));
+  }
+  object.store = WindowStore(object.lane_candidate.size(), group.read_bytes("windows"), scale);
+  return object;
+}
+
+}  // namespace
+
+void write_parts(const Hdf5Group& group, const PartsModel& parts) {
+  group.write("bands", std::int64_t{parts.bands});
+  group.write("background",
+              Eigen::MatrixXf(Eigen::Map<const Eigen::MatrixXf>(parts.background.data(), 3, 1)));
+  group.write("mean", Eigen::MatrixXf(parts.space.mean()));
+  group.write("basis", parts.space.basis());
+  group.write("mean_mass", static_cast<double>(parts.space.mean_mass()));
+  group.write("learned_step", static_cast<double>(parts.scale.learned));
+  group.write("query_step", static_cast<double>(parts.scale.query));
+  group.write("noise", parts.noise);
+  group.write("smallest_rate", parts.smallest_rate);
+  const Hdf5Group objects = group.make_group("objects");
+  for (std::size_t o = 0; o < parts.objects.size(); ++o) {
+    const Hdf5Group object = objects.make_group(numbered(o));
+    write_windows(object, parts.objects[o]);
+    object.write("rejection_score", parts.calibration[o].rejection_score);
+    object.write("typical_score", parts.calibration[o].typical_score);
+    object.write("covered_share", parts.calibration[o].covered_share);
+    const PoseSpace& pose = parts.poses[o];
+    object.write("pixel_mean", Eigen::MatrixXf(pose.pixel_mean()));
+    write_scale(object.make_group("coarse"), pose.coarse(), pose.coarse_manifold());
+    write_scale(object.make_group("fine"), pose.fine(), pose.fine_manifold());
+  }
+}
+
+PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& objects) {
+  PartsModel parts;
+  parts.bands = static_cast<int>(group.read_integer("bands"));
+  const Eigen::MatrixXf background = group.read_floats("background");
+  const Hdf5Group stored = group.open_group("objects");
+  const std::vector<std::string> names = stored.group_names();
+  if (background.size() != 3 || names.size() != objects.size() || (parts.bands != 1 && parts.bands != 3)) {
+    throw Hdf5Failure("has windows that do not fit its objects");
+  }
+  std::copy_n(background.data(), 3, parts.background.begin());
+  parts.space = WindowSpace::from_parts(group.read_floats("mean"), group.read_floats("basis"),
+                                        static_cast<float>(group.read_double("mean_mass")));
+  if (parts.space.length() != window_length(parts.bands)) {
+    throw Hdf5Failure("has windows of another kind than its bands");
+  }
+  parts.scale = {static_cast<float>(group.read_double("learned_step")),
+                 static_cast<float>(group.read_double("query_step"))};
+  parts.noise = group.read_double("noise");
+  parts.smallest_rate = group.read_double("smallest_rate");
+  for (std::size_t o = 0; o < names.size(); ++o) {
+    const Hdf5Group object = stored.open_group(names[o]);
+    parts.objects.push_back(read_windows(object, parts.scale));
+    PartsCalibration calibration;
+    calibration.rejection_score = object.read_double("rejection_score");
+    calibration.typical_score = object.read_double("typical_score");
+    calibration.covered_share = object.read_double("covered_share");
+    parts.calibration.push_back(calibration);
+    const Hdf5Group coarse = object.open_group("coarse");
+    const Hdf5Group fine = object.open_group("fine");
+    parts.poses.push_back(PoseSpace::from_parts(
+        read_scale(coarse), read_scale(fine), object.read_floats("pixel_mean"),
+        read_manifold(coarse, objects[o].manifold), read_manifold(fine, objects[o].manifold)));
+  }
+  return parts;
+}
+
+}  // namespace eigenpose
