@@ -8,6 +8,7 @@
 
 #include "config/toml_table.h"
 #include "core/base/error.h"
+#include "drivers/usb/apt_stage.h"
 
 namespace eigenpose {
 namespace {
@@ -122,6 +123,13 @@ AxisOptions read_axis(const TomlTable& table, const std::filesystem::path& base)
   if (options.driver == "modbus") {
     options.profile = read_path(table, "profile", "", base);
     options.station = static_cast<int>(table.integer("station", options.station, 1, 247));
+  } else {
+    options.stage = table.text("stage");
+    try {
+      apt_stage(options.stage);
+    } catch (const std::invalid_argument& error) {
+      table.fail("stage", error.what());
+    }
   }
   dof.unit = table.choice("unit", "deg", {"deg", "mm"});
   dof.periodic = table.flag("periodic", dof.unit == "deg");

@@ -65,6 +65,7 @@ struct AxisOptions {
   std::string endpoint;  ///< "tcp://HOST:PORT", "rtu:/dev/ttyUSB0:115200:8E1", "usb:SERIAL", "simulated"
   std::filesystem::path profile;            ///< modbus: register description; empty: Oriental Motor AZ
   int station = 1;                          ///< modbus: the drive's address on the bus
+  std::string stage;                        ///< apt: "PRM1-Z8", …: gears and encoder
   double home_offset = 0.0;                 ///< the axis's zero, counted from the home position, in the unit
   std::optional<double> steps_per_unit;     ///< gears included; the profile's own if not given
   bool reversed = false;                    ///< the drive counts up where the axis counts down

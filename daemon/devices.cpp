@@ -14,6 +14,9 @@
 #include "drivers/modbus/modbus_axis.h"
 #include "drivers/modbus/modbus_bus.h"
 #include "drivers/modbus/modbus_lamp.h"
+#include "drivers/usb/apt_axis.h"
+#include "drivers/usb/enttec_dmx_lamp.h"
+#include "drivers/usb/ftdi_link.h"
 #include "drivers/v4l2/v4l2_camera.h"
 #ifdef EIGENPOSE_SIM
 #include "sim/camera/replay_camera.h"
@@ -127,6 +130,32 @@ std::function<std::unique_ptr<Axis>()> modbus_axis(const AxisOptions& axis, Work
   };
 }
 
+/// "usb:SERIAL" → SERIAL.
+std::string usb_serial(const std::string& endpoint) {
+  constexpr std::string_view scheme = "usb:";
+  if (!endpoint.starts_with(scheme) || endpoint.size() == scheme.size())
+    throw std::invalid_argument(
+        fmt::format("endpoint \"{}\": a device on USB is named \"usb:SERIAL\"", endpoint));
+  return endpoint.substr(scheme.size());
+}
+
+std::function<std::unique_ptr<Axis>()> apt_axis(const AxisOptions& axis, Workbench& bench) {
+  FtdiLinkOptions link;
+  link.serial = usb_serial(axis.endpoint);
+  link.flow_control = FtdiFlowControl::rts_cts;
+  AptAxisOptions options;
+  options.name = axis.dof.name;
+  options.dof = axis.dof;
+  options.stage = apt_stage(axis.stage);
+  options.reversed = axis.reversed;
+  options.zero_offset = axis.home_offset;
+  options.speed = axis.speed.value_or(0.0);
+  options.arrival_tolerance = axis.arrival_tolerance.value_or(0.0);
+  return [options, link, &clock = bench.clock] {
+    return std::make_unique<AptAxis>(options, std::make_unique<FtdiLink>(link, clock), clock);
+  };
+}
+
 // Lamps --------------------------------------------------------------------------------------------------
 
 std::function<std::unique_ptr<Lamp>()> modbus_lamp(const LampOptions& lamp, Workbench& bench) {
@@ -144,6 +173,18 @@ std::function<std::unique_ptr<Lamp>()> simulated_lamp(const LampOptions& lamp, W
 }
 #endif
 
+std::function<std::unique_ptr<Lamp>()> dmx_lamp(const LampOptions& lamp, Workbench& bench) {
+  FtdiLinkOptions link;
+  link.serial = usb_serial(lamp.endpoint);
+  link.baud = 57600;
+  EnttecDmxLampOptions options;
+  options.name = lamp.name;
+  options.channels = {{lamp.channel, 1.0}};
+  return [options, link, &clock = bench.clock] {
+    return std::make_unique<EnttecDmxLamp>(options, std::make_unique<FtdiLink>(link, clock), clock);
+  };
+}
+
 // The table ----------------------------------------------------------------------------------------------
 
 const std::map<std::string, FrameHub::OpenCamera (*)(const CameraOptions&, Workbench&)> cameras = {
@@ -157,11 +198,13 @@ const std::map<std::string, FrameHub::OpenCamera (*)(const CameraOptions&, Workb
 const std::map<std::string, std::function<std::unique_ptr<Axis>()> (*)(const AxisOptions&, Workbench&)> axes =
     {
         {"modbus", modbus_axis},
+        {"apt", apt_axis},
 };
 
 const std::map<std::string, std::function<std::unique_ptr<Lamp>()> (*)(const LampOptions&, Workbench&)>
     lamps = {
         {"modbus", modbus_lamp},
+        {"dmx", dmx_lamp},
 #ifdef EIGENPOSE_SIM
         {"simulated", simulated_lamp},
 #endif

@@ -95,11 +95,18 @@ void check_node(const Machine& machine, const std::string& subject, const fs::pa
   }
 }
 
-/// "rtu:/dev/ttyUSB0:115200:8E1" → "/dev/ttyUSB0"; "usb:SERIAL" → "SERIAL"; otherwise nothing.
-std::optional<std::string> part_after(const std::string& endpoint, const std::string& scheme) {
+/// "rtu:/dev/ttyUSB0:115200:8E1" → "/dev/ttyUSB0"; nothing for another kind of endpoint.
+std::optional<std::string> port_of(const std::string& endpoint) {
+  constexpr std::string_view scheme = "rtu:";
   if (!endpoint.starts_with(scheme)) return std::nullopt;
-  const std::size_t begin = scheme.size();
-  return endpoint.substr(begin, endpoint.find(':', begin) - begin);
+  return endpoint.substr(scheme.size(), endpoint.find(':', scheme.size()) - scheme.size());
+}
+
+/// "usb:SERIAL" → SERIAL; nothing for another kind of endpoint.
+std::optional<std::string> serial_of(const std::string& endpoint) {
+  constexpr std::string_view scheme = "usb:";
+  if (!endpoint.starts_with(scheme)) return std::nullopt;
+  return endpoint.substr(scheme.size());
 }
 
 void check_serial_port(const Machine& machine, const std::string& subject, const std::string& port,
@@ -265,9 +272,9 @@ void check_machine(const Machine& given, const Config& config, const Inventory& 
   bool needs_rules = false;
   if (config.camera) check_camera_node(machine, *config.camera, inventory, report);
   const auto check_endpoint = [&](const std::string& subject, const std::string& endpoint) {
-    if (const auto port = part_after(endpoint, "rtu:")) {
+    if (const auto port = port_of(endpoint)) {
       check_serial_port(machine, subject, *port, inventory, report);
-    } else if (const auto serial = part_after(endpoint, "usb:")) {
+    } else if (const auto serial = serial_of(endpoint)) {
       needs_rules = true;
       check_usb(machine, subject, *serial, inventory, report);
     }

@@ -109,6 +109,13 @@ TEST(Config, APlanNamesAxesThatExistAndPositionsTheyReach) {
   EXPECT_EQ(config.plans[0].size(), 36U);
 }
 
+TEST(Config, AnAptAxisNamesAStageThatIsKnown) {
+  const std::string apt = "[[axis]]\nname = \"arm\"\ndriver = \"apt\"\nendpoint = \"usb:83000001\"\n";
+  EXPECT_THAT(refusal(apt), HasSubstr("stage"));
+  EXPECT_THAT(refusal(apt + "stage = \"PRM2\"\n"), AllOf(StartsWith("rig.toml:5: "), HasSubstr("PRM1-Z8")));
+  EXPECT_EQ(refusal(apt + "stage = \"PRM1-Z8\"\n"), "accepted");
+}
+
 TEST(Config, ASimulatedDeviceNeedsASimulatedLab) {
   const std::string camera = "[camera]\ndriver = \"simulated\"\n";
   EXPECT_THAT(refusal(camera), AllOf(StartsWith("rig.toml:2: "), HasSubstr("[sim]")));
