@@ -19,6 +19,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+/// A block, without the heap: at most 16 × 16.
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 16, 16>;
+
 /// Orthonormal DCT-II of n numbers, one row a frequency.
 MatrixXd cosine_matrix(std::size_t n) {
   MatrixXd matrix(static_cast<Index>(n), static_cast<Index>(n));
@@ -35,10 +38,19 @@ MatrixXd cosine_matrix(std::size_t n) {
 /// Sets the smallest coefficients to zero while their energy stays within `budget`. @return how many reach to
 /// the last one kept.
 std::size_t drop_small(std::vector<double>& coefficients, std::vector<std::size_t>& order, double budget) {
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::abs(coefficients[a]) < std::abs(coefficients[b]);
-  });
+  order.clear();
+  double candidates = 0.0;
+  for (std::size_t i = 0; i < coefficients.size(); ++i) {
+    const double energy = coefficients[i] * coefficients[i];
+    if (energy > budget) continue;
+    order.push_back(i);
+    candidates += energy;
+  }
+  if (candidates > budget) {
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return std::abs(coefficients[a]) < std::abs(coefficients[b]);
+    });
+  }
   double dropped = 0.0;
   for (const std::size_t i : order) {
     dropped += coefficients[i] * coefficients[i];
@@ -98,14 +110,16 @@ BlockTransform::Corner BlockTransform::corner(std::size_t position) const {
 
 void BlockTransform::forward(const double* view, std::size_t position, double* coefficients) const {
   const Corner at = corner(position);
-  MatrixXd pixels = MatrixXd::Zero(down_.rows(), across_.rows());
+  SmallMatrix pixels = SmallMatrix::Zero(down_.rows(), across_.rows());
   for (std::size_t y = 0; y < std::min(height_, shape_.rows - at.row); ++y) {
     for (std::size_t x = 0; x < std::min(width_, shape_.columns - at.column); ++x) {
       pixels(static_cast<Index>(y), static_cast<Index>(x)) =
           view[((at.row + y) * shape_.columns + at.column + x) * shape_.bands + at.band];
     }
   }
-  const MatrixXd frequencies = (down_ * pixels).eval() * across_.transpose();
+  // Blocks are too small for a blocked product to pay.
+  const SmallMatrix rows = down_.lazyProduct(pixels);
+  const SmallMatrix frequencies = rows.lazyProduct(across_.transpose());
   for (std::size_t c = 0; c < zigzag_.size(); ++c) {
     coefficients[c] =
         frequencies(static_cast<Index>(zigzag_[c] / width_), static_cast<Index>(zigzag_[c] % width_));
@@ -113,12 +127,13 @@ void BlockTransform::forward(const double* view, std::size_t position, double* c
 }
 
 void BlockTransform::add_inverse(const double* coefficients, std::size_t position, double* view) const {
-  MatrixXd frequencies(down_.rows(), across_.rows());
+  SmallMatrix frequencies(down_.rows(), across_.rows());
   for (std::size_t c = 0; c < zigzag_.size(); ++c) {
     frequencies(static_cast<Index>(zigzag_[c] / width_), static_cast<Index>(zigzag_[c] % width_)) =
         coefficients[c];
   }
-  const MatrixXd pixels = (down_.transpose() * frequencies).eval() * across_;
+  const SmallMatrix columns = down_.transpose().lazyProduct(frequencies);
+  const SmallMatrix pixels = columns.lazyProduct(across_);
   const Corner at = corner(position);
   for (std::size_t y = 0; y < std::min(height_, shape_.rows - at.row); ++y) {
     for (std::size_t x = 0; x < std::min(width_, shape_.columns - at.column); ++x) {

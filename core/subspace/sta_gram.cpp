@@ -30,35 +30,43 @@ std::size_t pack(const CodedPosition& position, std::size_t first, std::size_t n
   return widest;
 }
 
-/// Rows [first, last) of the lower triangle, as differences along both axes: a rectangle of equal values is
-/// four numbers.
+/// Rows [first, last) of the lower triangle, as second differences: a rectangle of equal values is four
+/// numbers, and of neighbouring rectangles most of these meet.
 class Band {
  public:
   Band(std::size_t first, std::size_t last)
       : first_(first),
         last_(last),
-        steps_(MatrixXd::Zero(static_cast<Index>(last - first + 1), static_cast<Index>(last + 1))) {}
+        steps_(Steps::Zero(static_cast<Index>(last - first + 1), static_cast<Index>(last + 1))) {}
 
-  void add(std::size_t row, std::size_t row_end, std::size_t column, std::size_t column_end, double value) {
-    const auto top = static_cast<Index>(std::max(row, first_) - first_);
-    const auto bottom = static_cast<Index>(std::min(row_end, last_) - first_);
-    const auto left = static_cast<Index>(column);
-    const auto right = static_cast<Index>(std::min(column_end, last_));
-    steps_(top, left) += value;
-    steps_(bottom, left) -= value;
-    steps_(top, right) -= value;
-    steps_(bottom, right) += value;
+  /// Adds a grid of rectangles: value(r, c) for views [row_ends[r], row_ends[r+1]) × [column_ends[c],
+  /// column_ends[c+1]).
+  void add(const std::vector<std::size_t>& row_ends, const std::vector<std::size_t>& column_ends,
+           const std::vector<double>& values) {
+    const std::size_t rows = row_ends.size() - 1;
+    const std::size_t columns = column_ends.size() - 1;
+    for (std::size_t r = 0; r <= rows; ++r) {
+      const double* here = r < rows ? values.data() + r * kTile : nullptr;
+      const double* above = r > 0 ? values.data() + (r - 1) * kTile : nullptr;
+      double* steps = &steps_(static_cast<Index>(std::clamp(row_ends[r], first_, last_) - first_), 0);
+      double before = 0.0;
+      for (std::size_t c = 0; c < columns; ++c) {
+        const double now = (here != nullptr ? here[c] : 0.0) - (above != nullptr ? above[c] : 0.0);
+        steps[std::min(column_ends[c], last_)] += now - before;
+        before = now;
+      }
+      steps[std::min(column_ends[columns], last_)] -= before;
+    }
   }
 
   void write(MatrixXd& gram) {
     const auto rows = static_cast<Index>(last_ - first_);
-    for (Index j = 0; j < static_cast<Index>(last_); ++j) {
-      if (j > 0) steps_.col(j) += steps_.col(j - 1);
+    for (Index i = 0; i < rows; ++i) {
+      if (i > 0) steps_.row(i) += steps_.row(i - 1);
+      const Index row = static_cast<Index>(first_) + i;
       double value = 0.0;
-      for (Index i = 0; i < rows; ++i) {
+      for (Index j = 0; j <= row; ++j) {
         value += steps_(i, j);
-        const Index row = static_cast<Index>(first_) + i;
-        if (j > row) continue;
         gram(row, j) = value;
         gram(j, row) = value;
       }
@@ -66,9 +74,19 @@ class Band {
   }
 
  private:
+  using Steps = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   std::size_t first_, last_;
-  MatrixXd steps_;
+  Steps steps_;
 };
+
+/// Where superblocks [first, first + n) begin, and where the last one ends.
+std::vector<std::size_t> ends_of(const CodedPosition& position, std::size_t first, std::size_t n,
+                                 std::size_t views) {
+  std::vector<std::size_t> ends(n + 1);
+  for (std::size_t s = 0; s < n; ++s) ends[s] = position.superblocks[first + s].first_view;
+  ends[n] = position.end_of(first + n - 1, views);
+  return ends;
+}
 
 void add_position(const CodedPosition& position, std::size_t views, std::size_t first, std::size_t last,
                   std::size_t stride, Band& band) {
@@ -87,18 +105,14 @@ void add_position(const CodedPosition& position, std::size_t views, std::size_t 
     const std::size_t rows = std::min(kTile, end - i);
     const std::size_t left_width = pack(position, i, rows, stride, left);
     if (left_width == 0) continue;
+    const std::vector<std::size_t> row_ends = ends_of(position, i, rows, views);
     for (std::size_t j = 0; j < end; j += kTile) {
       const std::size_t columns = std::min(kTile, end - j);
       const std::size_t width = std::min(left_width, pack(position, j, columns, stride, right));
       if (width == 0) continue;
       std::fill(values.begin(), values.end(), 0.0);
       kernels.dots(left.data(), stride, rows, right.data(), stride, columns, width, values.data(), kTile);
-      for (std::size_t r = 0; r < rows; ++r) {
-        for (std::size_t c = 0; c < columns; ++c) {
-          band.add(blocks[i + r].first_view, position.end_of(i + r, views), blocks[j + c].first_view,
-                   position.end_of(j + c, views), values[r * kTile + c]);
-        }
-      }
+      band.add(row_ends, ends_of(position, j, columns, views), values);
     }
   }
 }
