@@ -29,7 +29,7 @@ struct DriveOptions {
   std::uint8_t unit = 1;          ///< Modbus address, 1…247
   LabAxis axis = LabAxis::table;  ///< what the motor turns
   double steps_per_degree = 100.0;
-  double home_deg = 0.0;            ///< where the axis stands when the drive counts 0
+  double home_deg = 0.0;              ///< where the axis stands when the drive counts 0
   std::optional<double> lower_deg{};  ///< software limits of the axis, none for a turntable
   std::optional<double> upper_deg{};
   bool homed = false;                 ///< at power on

@@ -272,7 +272,7 @@ class SimModbusServer::Worker {
   std::jthread thread_;                 // last: it ends before what it uses
 };
 
-SimModbusServer::SimModbusServer(SimLab& lab, SimModbusServerOptions options)
+SimModbusServer::SimModbusServer(SimLab& lab, const SimModbusServerOptions& options)
     : worker_(std::make_unique<Worker>(lab, options)) {}
 SimModbusServer::~SimModbusServer() = default;
 

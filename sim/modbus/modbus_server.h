@@ -23,7 +23,7 @@ struct SimModbusServerOptions {
 class SimModbusServer {
  public:
   /// @throws Error when the port cannot be had.
-  SimModbusServer(SimLab& lab, SimModbusServerOptions options);
+  SimModbusServer(SimLab& lab, const SimModbusServerOptions& options);
   SimModbusServer(const SimModbusServer&) = delete;
   SimModbusServer& operator=(const SimModbusServer&) = delete;
   ~SimModbusServer();

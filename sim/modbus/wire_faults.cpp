@@ -1,13 +1,19 @@
 #include "sim/modbus/wire_faults.h"
 
 #include <stdexcept>
+#include <string>
 
 namespace eigenpose::sim {
 
 void FaultPlan::add(const WireFault& fault, int times, int skip) {
+  constexpr int most = 1'000'000;
+  if (times < 0 || skip < 0 || times > most || skip > most) {
+    throw std::invalid_argument("planned faults are counted from 0 to a million, not " +
+                                std::to_string(times) + " after " + std::to_string(skip));
+  }
   const std::lock_guard lock(mutex_);
-  planned_.insert(planned_.end(), static_cast<std::size_t>(std::max(skip, 0)), WireFault{});
-  planned_.insert(planned_.end(), static_cast<std::size_t>(std::max(times, 0)), fault);
+  planned_.insert(planned_.end(), static_cast<std::size_t>(skip), WireFault{});
+  planned_.insert(planned_.end(), static_cast<std::size_t>(times), fault);
 }
 
 void FaultPlan::at_random(double rate, std::uint64_t seed, std::vector<WireFault> faults) {
