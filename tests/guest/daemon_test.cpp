@@ -1,6 +1,7 @@
 // The whole service on real kernel devices: vivid looped with our own pictures as camera, a turntable over
 // Modbus TCP, a stage behind an FTDI chip through libusb. Runs in the guest.
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -9,15 +10,18 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include "core/image/image_set.h"
 #include "daemon/client/api_client.h"
 #include "sim/lab/sim_lab.h"
 #include "sim/modbus/modbus_server.h"
+#include "sim/usb/apt_controller.h"
 #include "tests/guest/looped_pictures.h"
 
 extern char** environ;
@@ -61,9 +65,108 @@ class Service {
   pid_t process_ = 0;
 };
 
+/// A simulated stage's controller at the far end of the emulated FTDI chip, which is the guest's second
+/// serial port.
+class StageOnTheCable {
+ public:
+  explicit StageOnTheCable(sim::SimLab& lab) : controller_(lab, faster()) {
+    descriptor_ = open("/dev/ttyS1", O_RDWR | O_NOCTTY | O_CLOEXEC);
+    if (descriptor_ < 0) throw std::runtime_error("/dev/ttyS1: is the guest run with --ftdi?");
+    termios line{};
+    cfmakeraw(&line);
+    line.c_cflag |= CLOCAL | CREAD;
+    line.c_cc[VMIN] = 0;
+    line.c_cc[VTIME] = 1;
+    cfsetspeed(&line, B115200);
+    tcsetattr(descriptor_, TCSANOW, &line);
+    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+  }
+  ~StageOnTheCable() {
+    thread_ = {};
+    close(descriptor_);
+  }
+  StageOnTheCable(const StageOnTheCable&) = delete;
+  StageOnTheCable& operator=(const StageOnTheCable&) = delete;
+
+ private:
+  static sim::AptControllerOptions faster() {
+    sim::AptControllerOptions options;
+    options.speed_factor = 10.0;
+    return options;
+  }
+
+  void serve(const std::stop_token& stop) {
+    std::array<std::uint8_t, 256> bytes{};
+    while (!stop.stop_requested()) {
+      pollfd waits{descriptor_, POLLIN, 0};
+      if (poll(&waits, 1, 20) > 0) {
+        const ssize_t count = read(descriptor_, bytes.data(), bytes.size());
+        if (count > 0) say(controller_.receive({bytes.data(), static_cast<std::size_t>(count)}));
+      }
+      say(controller_.spontaneous());
+    }
+  }
+  void say(const std::vector<std::uint8_t>& bytes) {
+    for (std::size_t sent = 0; sent < bytes.size();) {
+      const ssize_t count = write(descriptor_, bytes.data() + sent, bytes.size() - sent);
+      if (count <= 0) return;  // nobody listens at the other end: an unplugged chip
+      sent += static_cast<std::size_t>(count);
+    }
+  }
+
+  sim::AptController controller_;
+  int descriptor_ = -1;
+  std::jthread thread_;
+};
+
+/// The plug of the emulated FTDI chip, pulled through QEMU's monitor.
+class UsbPlug {
+ public:
+  UsbPlug() : monitor_(open("/dev/virtio-ports/qmp", O_RDWR | O_CLOEXEC)) {
+    if (monitor_ < 0) throw std::runtime_error("no QEMU monitor: is the guest run with --ftdi and --udev?");
+    tell(R"({"execute":"qmp_capabilities"})");
+  }
+  ~UsbPlug() { close(monitor_); }
+  UsbPlug(const UsbPlug&) = delete;
+  UsbPlug& operator=(const UsbPlug&) = delete;
+
+  void pull() { tell(R"({"execute":"device_del","arguments":{"id":"ftdi0"}})"); }
+  /// The same chip: without its serial number QEMU makes one of the port, which is another one the second
+  /// time.
+  void put_back() {
+    tell(R"({"execute":"device_add","arguments":{"driver":"usb-serial","id":"ftdi0","chardev":"ftdi",)"
+         R"("always-plugged":true,"serial":")" +
+         serial_ + R"("}})");
+  }
+  /// The chip's serial number, from the system; empty while it is unplugged.
+  static std::string serial() {
+    for (const auto& entry : fs::directory_iterator("/sys/bus/usb/devices")) {
+      std::string vendor, serial;
+      std::ifstream(entry.path() / "idVendor") >> vendor;
+      std::ifstream(entry.path() / "serial") >> serial;
+      if (vendor == "0403") return serial;
+    }
+    return {};
+  }
+
+ private:
+  void tell(const std::string& line) {
+    const std::string command = line + "\n";
+    if (write(monitor_, command.data(), command.size()) < 0)
+      throw std::runtime_error("the monitor does not listen");
+    std::array<char, 4096> answer{};
+    pollfd waits{monitor_, POLLIN, 0};
+    while (poll(&waits, 1, 300) > 0 && read(monitor_, answer.data(), answer.size()) > 0) {
+    }
+  }
+  const int monitor_;
+  const std::string serial_ = serial();
+};
+
 class DaemonInTheGuest : public testing::Test {
  protected:
-  DaemonInTheGuest() : lab_(clock_, {}), drives_(lab_, {}), pictures_([this](cv::Mat& luma) { draw(luma); }) {
+  DaemonInTheGuest()
+      : lab_(clock_, {}), drives_(lab_, {}), stage_(lab_), pictures_([this](cv::Mat& luma) { draw(luma); }) {
     fs::create_directories(folder_);
     std::ofstream(folder_ / "rig.toml") << config();
   }
@@ -99,10 +202,10 @@ station = 1
 settle_ms = 600
 [[axis]]
 name = "arm"
-driver = "modbus"
-endpoint = "tcp://127.0.0.1:)" +
-           std::to_string(drives_.port()) + R"("
-station = 2
+driver = "apt"
+stage = "PRM1-Z8"
+endpoint = "usb:)" +
+           UsbPlug::serial() + R"("
 periodic = false
 lower = -90.0
 upper = 90.0
@@ -175,6 +278,8 @@ enabled = false
   SteadyClock clock_;
   sim::SimLab lab_;
   sim::SimModbusServer drives_;
+  StageOnTheCable stage_;
+  UsbPlug plug_;
   LoopedPictures pictures_;
 };
 
@@ -191,6 +296,26 @@ TEST_F(DaemonInTheGuest, AcquiresAndAcquiresAgainWithCameraAndUsbUnpluggedInTheM
   api.wait_for_job(job);
   check_views("second");
   EXPECT_GE(api.get("/v1/status").at("camera").at("times_lost").get<int>(), 1);
+
+  // Without the arm the acquisition fails and says so; once it is back, the rest is taken.
+  const std::string third = start(api, "third");
+  wait_for_views(api, third, 2);
+  plug_.pull();
+  EXPECT_THROW(api.wait_for_job(third), ApiError);
+  plug_.put_back();
+  bool done = false;
+  std::string trouble;
+  for (int attempt = 0; attempt < 20 && !done; ++attempt) {
+    try {
+      api.wait_for_job(start(api, "third"));
+      done = true;
+    } catch (const ApiError& error) {
+      trouble = error.what();
+      clock_.sleep_for(1s);
+    }
+  }
+  EXPECT_TRUE(done) << trouble;
+  check_views("third");
 }
 
 }  // namespace
