@@ -52,7 +52,7 @@ Duration move_to_pose(const AcquisitionRequest& request, Rig::Control& axes, con
 
 }  // namespace
 
-void acquire(const AcquisitionRequest& request, Rig& rig, const FrameHub& camera, const Clock& clock,
+void acquire(const AcquisitionRequest& request, Rig& rig, FrameHub& camera, const Clock& clock,
              AcquisitionReport& report, const Progress& progress, std::stop_token stop) {
   report.total = request.plan.size();
   ImageSetWriter set(request.image_sets, request.object, request.workspace,
@@ -62,8 +62,7 @@ void acquire(const AcquisitionRequest& request, Rig& rig, const FrameHub& camera
   report.kept = report.total - poses.size();
   spdlog::info("event=acquisition_started object={} plan={} views={} kept={}", request.object,
                request.plan.name, report.total, report.kept);
-  // A move may take long; a request to stop must reach the drive at once, not only between two looks at it.
-  const std::stop_callback stop_at_once(stop, [&] { rig.stop_motion(); });
+  const FrameHub::OnDemand on_demand(camera);
   rig.run([&](Rig::Control& axes) {
     std::vector<double> now;
     for (const std::vector<double>& q : poses) {

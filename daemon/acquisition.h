@@ -37,7 +37,7 @@ struct AcquisitionReport {
 /// has taken are not taken again. At the end the axes return to the plan's first pose.
 /// @throws FileError (a complete set of that name, a full disk) before or between moves, DeviceError and its
 /// kinds, Interrupted. Whatever ends it: no motion is left running, and what was taken is kept.
-void acquire(const AcquisitionRequest& request, Rig& rig, const FrameHub& camera, const Clock& clock,
+void acquire(const AcquisitionRequest& request, Rig& rig, FrameHub& camera, const Clock& clock,
              AcquisitionReport& report, const Progress& progress, std::stop_token stop);
 
 }  // namespace eigenpose

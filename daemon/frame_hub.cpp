@@ -21,6 +21,18 @@ std::string words(const std::exception_ptr& failure) {
   }
 }
 
+/// Counts one up while it lives; the count's lock is held at both ends.
+class Waiting {
+ public:
+  explicit Waiting(int& count) : count_(count) { ++count_; }
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+  ~Waiting() { --count_; }
+
+ private:
+  int& count_;
+};
+
 }  // namespace
 
 FrameHub::FrameHub(OpenCamera open, const Clock& clock) : open_(std::move(open)), clock_(clock) {
@@ -34,6 +46,19 @@ FrameHub::FrameHub(OpenCamera open, const Clock& clock) : open_(std::move(open))
 
 FrameHub::~FrameHub() = default;
 
+FrameHub::OnDemand::OnDemand(FrameHub& hub) : hub_(hub) {
+  const std::lock_guard lock(hub_.mutex_);
+  ++hub_.on_demand_;
+}
+
+FrameHub::OnDemand::~OnDemand() {
+  {
+    const std::lock_guard lock(hub_.mutex_);
+    --hub_.on_demand_;
+  }
+  hub_.changed_.notify_all();
+}
+
 std::optional<Frame> FrameHub::latest() const {
   const std::lock_guard lock(mutex_);
   return frame_;
@@ -41,6 +66,8 @@ std::optional<Frame> FrameHub::latest() const {
 
 Frame FrameHub::exposed_after(TimePoint since, TimePoint deadline, std::stop_token stop) const {
   std::unique_lock lock(mutex_);
+  const Waiting waiting(waiting_);
+  changed_.notify_all();
   std::uint64_t seen_frames = 0;
   std::uint64_t seen_troubles = 0;
   for (;;) {
@@ -74,6 +101,10 @@ CameraStatus FrameHub::status() const {
 void FrameHub::run(const std::stop_token& stop) {
   std::unique_ptr<Camera> camera;
   while (!stop.stop_requested()) {
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [this] { return on_demand_ == 0 || waiting_ > 0; })) return;
+    }
     try {
       if (!camera) {
         camera = open_();

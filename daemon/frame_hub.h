@@ -52,6 +52,19 @@ class FrameHub {
   /// @return nothing when `stop` was requested first, or when the camera has trouble; ask again.
   [[nodiscard]] std::optional<Frame> next(std::uint64_t& cursor, std::stop_token stop) const;
 
+  /// While one lives, frames are fetched only when `exposed_after` waits for one: nobody looks at the others,
+  /// and they cost time. The hub must outlive it.
+  class OnDemand {
+   public:
+    explicit OnDemand(FrameHub& hub);
+    OnDemand(const OnDemand&) = delete;
+    OnDemand& operator=(const OnDemand&) = delete;
+    ~OnDemand();
+
+   private:
+    FrameHub& hub_;
+  };
+
   [[nodiscard]] CameraStatus status() const;
 
  private:
@@ -68,6 +81,8 @@ class FrameHub {
   std::uint64_t troubles_ = 0;  ///< guarded by mutex_: failures so far
   std::exception_ptr trouble_;  ///< guarded by mutex_: the present one
   CameraStatus status_;         ///< guarded by mutex_
+  int on_demand_ = 0;           ///< guarded by mutex_: OnDemands alive
+  mutable int waiting_ = 0;     ///< guarded by mutex_: threads in `exposed_after`
   std::jthread thread_;         ///< last: ends before the rest goes
 };
 
