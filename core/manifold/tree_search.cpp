@@ -12,6 +12,9 @@ namespace eigenpose {
 
 namespace {
 
+/// Dimensions of a node fetched into the cache before it is looked at.
+constexpr std::size_t fetched_ahead = 4;
+
 /// 16^8 patches are more than memory holds.
 constexpr std::size_t max_levels = 8;
 
@@ -180,8 +183,15 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best,
       lanes[at] = lane;
     }
     if (inner) {
-      for (std::size_t i = count; i-- > 0;)
+      for (std::size_t i = count; i-- > 0;) {
         stack[waiting++] = {distances.squared[lanes[i]], node.first + lanes[i]};
+        // Most nodes are done after the first few dimensions: these are wanted soon.
+        const BoxSlice* soon = slices_.data() + (node.first + lanes[i]) * dims;
+        for (std::size_t k = 0; k < std::min(dims, fetched_ahead); ++k) {
+          __builtin_prefetch(soon[k].low);
+          __builtin_prefetch(soon[k].high);
+        }
+      }
       continue;
     }
     for (std::size_t i = 0; i < count; ++i) {
