@@ -198,7 +198,7 @@ EigenPairs assess(const KrylovBasis& basis, const KrylovOptions& options, const 
 }  // namespace
 
 EigenPairs leading_eigenpairs(Index size, const SymmetricProduct& product, const KrylovOptions& given,
-                              std::stop_token stop) {
+                              const std::stop_token& stop) {
   KrylovOptions options = given;
   options.wanted = std::min(options.wanted, size);
   options.block = std::clamp<Index>(options.block, 1, size);

@@ -33,6 +33,6 @@ struct KrylovOptions {
 /// vectors join, until that number exceeds every cluster. Start vectors are fixed by a seed: the same
 /// operator gives the same answer. Memory 16·n·max_vectors bytes. @throws Interrupted.
 EigenPairs leading_eigenpairs(Eigen::Index size, const SymmetricProduct& product,
-                              const KrylovOptions& options, std::stop_token stop = {});
+                              const KrylovOptions& options, const std::stop_token& stop = {});
 
 }  // namespace eigenpose

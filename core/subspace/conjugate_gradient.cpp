@@ -114,7 +114,8 @@ class Search {
 }  // namespace
 
 EigenPairs conjugate_gradient_eigenpairs(Index size, const SymmetricProduct& product,
-                                         const ConjugateGradientOptions& options, std::stop_token stop) {
+                                         const ConjugateGradientOptions& options,
+                                         const std::stop_token& stop) {
   const Index count = std::min(size, options.wanted + 1);
   Search search(size, product, options, count);
   while (search.found() < count && search.next(stop) > options.noise) {

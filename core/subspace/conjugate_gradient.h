@@ -25,6 +25,7 @@ struct ConjugateGradientOptions {
 /// to them. One more than K is searched, for the gap, and Rayleigh-Ritz over all of them ends it. One product
 /// an iteration; memory 16·n·K bytes. Repeated eigenvalues are found one after another. @throws Interrupted.
 EigenPairs conjugate_gradient_eigenpairs(Eigen::Index size, const SymmetricProduct& product,
-                                         const ConjugateGradientOptions& options, std::stop_token stop = {});
+                                         const ConjugateGradientOptions& options,
+                                         const std::stop_token& stop = {});
 
 }  // namespace eigenpose

@@ -123,7 +123,8 @@ void IncrementalEigenspace::add(const std::string& name, const AppearanceSource&
                    progress, stop);
     column += width;
   }
-  inner_products(fresh, fresh, true, options, grown.bottomRightCorner(added, added), progress, stop);
+  inner_products(fresh, fresh, true, options, grown.bottomRightCorner(added, added), progress,
+                 std::move(stop));
   for (Eigen::Index j = before; j < before + added; ++j) {
     for (Eigen::Index i = 0; i < j; ++i) grown(i, j) = grown(j, i);
   }
