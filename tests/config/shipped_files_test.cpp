@@ -117,8 +117,7 @@ TEST(ShippedFiles, EveryKeyThatIsAcceptedIsExplained) {
 TEST(ShippedFiles, AKeyBroughtToLifeIsStillAKey) {
   std::string text = with_every_key(content(config_folder / "eigenposed.toml"));
   // Keys of other drivers stand beside each other in the file for explaining only.
-  for (const char* key : {"exposure_ms = ", "folder = ", "degrees_per_index = ", "at = [",
-                          "station = 1\nprofile = \"profiles/dimmer", "profile = \"profiles/dimmer"}) {
+  for (const char* key : {"exposure_ms = ", "folder = ", "degrees_per_index = ", "at = ["}) {
     const std::size_t at = text.find(std::string("\n") + key);
     ASSERT_NE(at, std::string::npos) << key;
     text.insert(at + 1, "# ");
