@@ -107,12 +107,25 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
     }
   }
 
-  // Horizontally: short weighted sums, band by band.
-  double energy = 0.0;
-  float* out = appearance.data();
-  for (std::size_t i = 0; i < n; ++i) {
-    const float* source = sums_.data() + i * width;
-    for (std::size_t j = 0; j < n; ++j) {
+  // Horizontally: short weighted sums.
+  const auto sum_row = [&](const float* source, float* out) {
+    std::size_t j = 0;
+    if (bands == 3) {
+      // Four numbers at once: a pixel and the first of the next, which is overwritten by the next. The last
+      // pixels of a row are left to the plain loop, so that nothing beyond it is read.
+      using Four [[gnu::vector_size(16), gnu::aligned(4)]] = float;
+      const int end = horizontal_.extent;
+      for (; j + 1 < n && horizontal_.taps[j].first + horizontal_.taps[j].count < end; ++j) {
+        const Tap& tap = horizontal_.taps[j];
+        const float* weights = horizontal_.weights.data() + tap.weight;
+        const float* pixels = source + static_cast<std::ptrdiff_t>(tap.first) * 3;
+        Four sum{};
+        for (int s = 0; s < tap.count; ++s)
+          sum += weights[s] * *reinterpret_cast<const Four*>(pixels + 3 * s);
+        *reinterpret_cast<Four*>(out + 3 * j) = sum;
+      }
+    }
+    for (; j < n; ++j) {
       const Tap& tap = horizontal_.taps[j];
       const float* weights = horizontal_.weights.data() + tap.weight;
       const float* pixels = source + static_cast<std::size_t>(tap.first) * bands;
@@ -120,17 +133,31 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
         float sum = 0.0F;
         for (int s = 0; s < tap.count; ++s)
           sum += weights[s] * pixels[static_cast<std::size_t>(s) * bands + b];
-        *out++ = sum;
-        energy += static_cast<double>(sum) * sum;
+        out[j * bands + b] = sum;
       }
     }
-  }
+  };
+  for (std::size_t i = 0; i < n; ++i) sum_row(sums_.data() + i * width, appearance.data() + i * n * bands);
+  double energy = 0.0;
+  for (const float value : appearance) energy += static_cast<double>(value) * value;
   return static_cast<float>(std::sqrt(energy));
 }
 
 void shrink_appearance(std::span<const float> appearance, int size, int bands, int side,
                        std::span<float> reduced) {
   std::fill(reduced.begin(), reduced.end(), 0.0F);
+  if (size == 2 * side) {
+    const auto row = static_cast<std::ptrdiff_t>(size) * bands;
+    float* out = reduced.data();
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x) {
+        const float* upper = appearance.data() + 2 * y * row + static_cast<std::ptrdiff_t>(2 * x) * bands;
+        const float* lower = upper + row;
+        for (int b = 0; b < bands; ++b)
+          *out++ = 0.25F * (upper[b] + upper[bands + b] + lower[b] + lower[bands + b]);
+      }
+    return;
+  }
   const double scale = static_cast<double>(side) / size;
   const float area = static_cast<float>(scale * scale);
   // Where source pixel i falls: mostly into one target pixel, else into two.

@@ -11,16 +11,18 @@ namespace {
   for (std::size_t i = 0; i < count; ++i) out[i] = static_cast<float>(std::max(0, bytes[i] - level));
 }
 
+/// The levels repeat every three numbers; a block of 24 holds whole pixels and whole vectors.
+constexpr std::size_t block = 24;
+
 [[gnu::always_inline]] inline void subtract_three_body(const std::uint8_t* bytes, std::size_t count,
                                                        const std::uint8_t* level, float* out) {
-  const int l0 = level[0];
-  const int l1 = level[1];
-  const int l2 = level[2];
-  for (std::size_t i = 0; i + 2 < count; i += 3) {
-    out[i] = static_cast<float>(std::max(0, bytes[i] - l0));
-    out[i + 1] = static_cast<float>(std::max(0, bytes[i + 1] - l1));
-    out[i + 2] = static_cast<float>(std::max(0, bytes[i + 2] - l2));
-  }
+  int levels[block];
+  for (std::size_t i = 0; i < block; ++i) levels[i] = level[i % 3];
+  std::size_t i = 0;
+  for (; i + block <= count; i += block)
+    for (std::size_t j = 0; j < block; ++j)
+      out[i + j] = static_cast<float>(std::max(0, bytes[i + j] - levels[j]));
+  for (; i < count; ++i) out[i] = static_cast<float>(std::max(0, bytes[i] - levels[i % block]));
 }
 
 [[gnu::always_inline]] inline void add_body(const float* __restrict in, float weight, std::size_t count,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/recognition/projection_kernel.h"
+
 namespace eigenpose {
 
 OwnSpaces::OwnSpaces(const Model& model) : model_(model), searches_(model.objects.size()) {
@@ -32,7 +34,7 @@ ClosestPoint OwnSpaces::closest(std::size_t o) {
   const Eigenspace& space = model_.objects[o].space->eigenspace;
   centered_ = reduced_ - space.mean;
   auto point = point_.head(space.components());
-  point.noalias() = space.basis.transpose() * centered_;
+  project_onto(space.basis, centered_, point);
   ClosestPoint found;
   (void)searches_[o]->nearest_into(point, {&found, 1});
   const double outside = std::max(0.0, static_cast<double>(centered_.squaredNorm()) - point.squaredNorm());

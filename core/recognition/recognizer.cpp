@@ -12,6 +12,7 @@
 #include "core/recognition/own_spaces.h"
 #include "core/recognition/parts_stage.h"
 #include "core/recognition/pose_table.h"
+#include "core/recognition/projection_kernel.h"
 
 namespace eigenpose {
 namespace {
@@ -149,7 +150,7 @@ float Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
 
 void Recognizer::Impl::project(float energy) {
   // Norm and mean are folded in: basisᵀ (x/‖x‖ − mean).
-  point.noalias() = model->eigenspace.basis.transpose() * appearance;
+  project_onto(model->eigenspace.basis, appearance, point);
   point /= energy;
   point -= mean_point;
 }

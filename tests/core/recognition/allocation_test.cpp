@@ -1,0 +1,122 @@
+/// The path from frame to outcome takes no memory once it is warm.
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include <gtest/gtest.h>
+
+#include "core/recognition/recognizer.h"
+#include "tests/support/learned_world.h"
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size) {
+  ++allocations;
+  void* memory = std::malloc(size == 0 ? 1 : size);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+void* counted(std::size_t size, std::align_val_t alignment) {
+  ++allocations;
+  void* memory = nullptr;
+  if (posix_memalign(&memory, std::max<std::size_t>(sizeof(void*), static_cast<std::size_t>(alignment)),
+                     size) != 0)
+    throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return counted(size);
+}
+void* operator new[](std::size_t size) {
+  return counted(size);
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return counted(size, alignment);
+}
+void* operator new[](std::size_t size, std::align_val_t alignment) {
+  return counted(size, alignment);
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+
+namespace eigenpose {
+namespace {
+
+/// Counts what OpenCV takes for pictures; it goes past operator new.
+class CountingAllocator final : public cv::MatAllocator {
+ public:
+  cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, std::size_t* step,
+                         cv::AccessFlag flags, cv::UMatUsageFlags usage) const override {
+    ++allocations;
+    return cv::Mat::getStdAllocator()->allocate(dims, sizes, type, data, step, flags, usage);
+  }
+  bool allocate(cv::UMatData* data, cv::AccessFlag access, cv::UMatUsageFlags usage) const override {
+    ++allocations;
+    return cv::Mat::getStdAllocator()->allocate(data, access, usage);
+  }
+  void deallocate(cv::UMatData* data) const override { cv::Mat::getStdAllocator()->deallocate(data); }
+};
+
+TEST(FramePath, TakesNoMemoryOnceItIsWarm) {
+  Recognizer recognizer(testing::learned_world().model);
+  std::vector<cv::Mat> frames;
+  testing::SceneKnobs knobs;
+  knobs.width = 320;
+  for (int i = 0; i < 24; ++i) {
+    cv::Mat scene = testing::empty_scene(knobs, i);
+    knobs.x = 70.0 + i;
+    testing::draw_object(scene, 1 + i % 5, 15.0 * i, knobs);  // learned ones and strangers
+    knobs.x = 230.0;
+    if (i % 3 != 0) testing::draw_object(scene, testing::symmetric_kind, 0.0, knobs);
+    frames.push_back(scene);
+  }
+  frames.push_back(testing::empty_scene(knobs, 99));
+  static CountingAllocator counting;
+  cv::Mat::setDefaultAllocator(&counting);
+  const auto pass = [&] {
+    std::size_t outcomes = 0;
+    for (const cv::Mat& frame : frames) outcomes += recognizer.recognize(frame).size();
+    return outcomes;
+  };
+  const std::size_t first = pass();
+  (void)pass();
+  const long before = allocations;
+  const std::size_t third = pass();
+  const long taken = allocations - before;
+  cv::Mat::setDefaultAllocator(nullptr);
+  EXPECT_EQ(taken, 0);
+  EXPECT_EQ(first, third);
+  EXPECT_GT(third, frames.size());
+}
+
+}  // namespace
+}  // namespace eigenpose
