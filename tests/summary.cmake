@@ -1,6 +1,7 @@
 # Counts the tests of a JUnit report, and says of each skipped one what it missed.
 file(READ "${REPORT}" text)
-string(REPLACE ";" "," text "${text}")
+# CMake takes brackets and semicolons in a list's items for its own.
+string(REGEX REPLACE "[][;]" "," text "${text}")
 string(REGEX MATCHALL "<testcase [^>]*status=\"run\"" passed "${text}")
 string(REGEX MATCHALL "<testcase [^>]*status=\"fail\"" failed "${text}")
 string(REGEX MATCHALL "<testcase [^>]*status=\"(notrun|disabled)\"" skipped "${text}")
