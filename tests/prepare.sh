@@ -1,8 +1,8 @@
 # Sourced by tests/run and sim/demo: makes this machine ready and builds. Bash.
 #
-#   prepare_packages [tests]   install what is missing with apt (as root, or through sudo)
-#   prepare_owner "$@"         when root runs a checkout that belongs to somebody else, go on as that somebody
-#   prepare_build TARGET…      configure and build into build/release
+#   prepare_packages [tests] [guest] [ci]   install what is missing with apt (as root, or through sudo)
+#   prepare_owner "$@"      when root runs a checkout that belongs to somebody else, go on as that somebody
+#   prepare_build TARGET…   configure and build into build/release
 
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build="$top/build/release"
@@ -16,13 +16,19 @@ build_packages=(
 )
 # Independent peers that the tests talk to.
 test_packages=(mbpoll python3-pymodbus python3-serial python3-serial-asyncio socat)
+# The virtual machine with real kernel devices.
+guest_packages=(qemu-system-x86 seabios ipxe-qemu busybox-static cpio kmod udev xz-utils binutils)
+# What .ci/run checks with.
+ci_packages=(clang-format clang-tidy)
 
 say() { printf '\n\033[1m== %s\033[0m\n' "$*"; }
 fail() { printf '\n%s\n' "$*" >&2; exit 1; }
 
 prepare_packages() {
   local wanted=("${build_packages[@]}") missing=() package status
-  [ "${1:-}" = tests ] && wanted+=("${test_packages[@]}")
+  [[ " $* " = *" tests "* ]] && wanted+=("${test_packages[@]}")
+  [[ " $* " = *" guest "* ]] && wanted+=("${guest_packages[@]}")
+  [[ " $* " = *" ci "* ]] && wanted+=("${ci_packages[@]}")
   command -v dpkg-query >/dev/null || fail "This script installs Debian packages and found no dpkg here. Install by hand: ${wanted[*]}"
   for package in "${wanted[@]}"; do
     status=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
@@ -52,9 +58,8 @@ prepare_owner() {
 
 prepare_build() {
   say "Building (the first time takes some minutes)"
+  mkdir -p "$top/build"
   (cd "$top" && cmake --preset release >"$top/build/configure.log" 2>&1) ||
     { cat "$top/build/configure.log" >&2; fail "Configuring failed (above)."; }
   NINJA_STATUS='[%f/%t %es] ' cmake --build "$build" --target "$@" || fail "The build failed (above)."
 }
-
-mkdir -p "$top/build" 2>/dev/null || true

@@ -23,10 +23,10 @@ namespace {
 
 /// The commands, in the order `--help` shows them.
 const std::vector<AddCommand> commands = {
-    add_acquire_command,    //
-    add_results_command,    //
-    add_status_command,     //
-    add_objects_command,    //
+    add_acquire_command,  //
+    add_results_command,  //
+    add_status_command,   //
+    add_objects_command,  //
 #ifdef EIGENPOSE_SIM
     add_lab_command,  //
 #endif

@@ -1,25 +1,28 @@
-/// The demo: an operator's morning and a passer-by's afternoon on the simulated lab, played against a running daemon.
+/// The demo: an operator's morning and a passer-by's afternoon on the simulated lab, played against a running
+/// daemon.
 ///
-/// It acts only through doors that people have: the daemon's API sockets and the lab's control socket (hands that put
-/// things on the table). The truth it prints comes from where it put the object, never from the recogniser.
+/// It acts only through doors that people have: the daemon's API sockets and the lab's control socket (hands
+/// that put things on the table). The truth it prints comes from where it put the object, never from the
+/// recogniser.
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
 #include "core/base/angle.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "daemon/client/api_client.h"
 #include "daemon/cli/console.h"
+#include "daemon/client/api_client.h"
 #include "sim/lab/lab_client.h"
 
 namespace eigenpose {
@@ -102,8 +105,8 @@ void learn(ApiClient& api) {
   progress.clear();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const json model = api.get("/v1/status").at("model");
-  std::printf("   %d objects, %d views, %d dimensions  %.1f s\n", model.value("objects", 0), model.value("views", 0),
-              model.value("components", 0), seconds);
+  std::printf("   %d objects, %d views, %d dimensions  %.1f s\n", model.value("objects", 0),
+              model.value("views", 0), model.value("components", 0), seconds);
 }
 
 std::vector<Placement> plan(const Options& options, const std::vector<std::string>& learned,
@@ -113,7 +116,8 @@ std::vector<Placement> plan(const Options& options, const std::vector<std::strin
   std::vector<Placement> placements;
   for (unsigned i = 0; i < options.placements; ++i) {
     Placement placement;
-    // One placement in nine is a stranger, one in twelve an empty table; the others go round the learned objects.
+    // One placement in nine is a stranger, one in twelve an empty table; the others go round the learned
+    // objects.
     if (i % 9 == 4) {
       placement.stranger = true;
       placement.object = strangers[(i / 9) % strangers.size()];
@@ -134,23 +138,27 @@ json settled_result(ApiClient& api, double since) {
   const double deadline = monotonic_seconds() + 20.0;
   while (monotonic_seconds() < deadline) {
     const json result = api.get("/v1/results/latest");
-    if (result.value("state", "") == "settled" && result.value("exposure_monotonic_s", 0.0) > since) return result;
+    if (result.value("state", "") == "settled" && result.value("exposure_monotonic_s", 0.0) > since)
+      return result;
     SteadyClock().sleep_for(std::chrono::milliseconds(20));
   }
   throw Error("the daemon reported no settled picture within 20 s; see its log");
 }
 
-const char* mark(bool right) { return right ? "\u2713" : "\u2717 WRONG"; }
+const char* mark(bool right) {
+  return right ? "\u2713" : "\u2717 WRONG";
+}
 
 bool is_observable(const json& objects, const std::string& name) {
   for (const json& object : objects.at("objects"))
-    if (object.at("name") == name && !object.at("learned").is_null()) return object["learned"].value("pose_observable", true);
+    if (object.at("name") == name && !object.at("learned").is_null())
+      return object["learned"].value("pose_observable", true);
   return true;
 }
 
 /// Puts one thing on the table, asks what it is, prints the answer beside the truth, counts it.
-void show(ApiClient& api, sim::LabClient& lab, const Placement& placement, unsigned number, const json& objects,
-          Tally& tally) {
+void show(ApiClient& api, sim::LabClient& lab, const Placement& placement, unsigned number,
+          const json& objects, Tally& tally) {
   lab.clear();
   if (!placement.object.empty()) lab.place(placement.object, placement.yaw, placement.x_mm, placement.y_mm);
   const json result = settled_result(api, monotonic_seconds());
@@ -171,7 +179,8 @@ void show(ApiClient& api, sim::LabClient& lab, const Placement& placement, unsig
     ++tally.empty;
     right = outcomes.empty();
     tally.empty_right += right;
-    std::printf("  %3u  %-14s %8s   %-14s %8s %8s  %s\n", number, "(empty table)", "", said.c_str(), "", "", mark(right));
+    std::printf("  %3u  %-14s %8s   %-14s %8s %8s  %s\n", number, "(empty table)", "", said.c_str(), "", "",
+                mark(right));
   } else if (placement.stranger) {
     ++tally.strangers;
     right = said == "unknown";
@@ -186,7 +195,8 @@ void show(ApiClient& api, sim::LabClient& lab, const Placement& placement, unsig
     std::string error = "";
     if (right && !is_observable(objects, placement.object)) {
       pose = "any";
-      if (std::find(tally.without_pose.begin(), tally.without_pose.end(), placement.object) == tally.without_pose.end())
+      if (std::find(tally.without_pose.begin(), tally.without_pose.end(), placement.object) ==
+          tally.without_pose.end())
         tally.without_pose.push_back(placement.object);
     } else if (right) {
       const Angle seen = degrees(outcomes[0].at("q").at(0).get<double>());
@@ -201,8 +211,8 @@ void show(ApiClient& api, sim::LabClient& lab, const Placement& placement, unsig
     // A degree sign is two bytes and one column wide.
     const int wide = pose == "any" || pose.empty() ? 8 : 9;
     std::printf("  %3u  %-14s %7.1f\u00b0   %-14s %*s %*s  %s\n", number, placement.object.c_str(),
-                placement.yaw.degrees(), said.c_str(), wide, pose.c_str(), error.empty() ? 8 : 9, error.c_str(),
-                mark(right));
+                placement.yaw.degrees(), said.c_str(), wide, pose.c_str(), error.empty() ? 8 : 9,
+                error.c_str(), mark(right));
   }
   std::fflush(stdout);
 }
@@ -211,7 +221,8 @@ void save_picture(ApiClient& api, const std::string& folder, unsigned number) {
   char name[32];
   std::snprintf(name, sizeof name, "/%03u.jpg", number);
   const std::string jpeg = api.get_bytes("/v1/frame.jpg");
-  std::ofstream(folder + name, std::ios::binary).write(jpeg.data(), static_cast<std::streamsize>(jpeg.size()));
+  std::ofstream(folder + name, std::ios::binary)
+      .write(jpeg.data(), static_cast<std::streamsize>(jpeg.size()));
 }
 
 bool report(Tally& tally, const std::vector<std::string>& symmetric_learned) {
@@ -221,9 +232,11 @@ bool report(Tally& tally, const std::vector<std::string>& symmetric_learned) {
   for (const double error : errors) mean += error / static_cast<double>(errors.size());
   std::printf("\n   known objects   %u of %u right\n", tally.known_right, tally.known);
   if (!errors.empty())
-    std::printf("   pose error      mean %.2f\u00b0, median %.2f\u00b0, largest %.2f\u00b0 over %zu placements\n", mean,
-                errors[errors.size() / 2], errors.back(), errors.size());
-  for (const std::string& name : tally.without_pose) std::printf("   left out        %s: its pose cannot be seen\n", name.c_str());
+    std::printf(
+        "   pose error      mean %.2f\u00b0, median %.2f\u00b0, largest %.2f\u00b0 over %zu placements\n",
+        mean, errors[errors.size() / 2], errors.back(), errors.size());
+  for (const std::string& name : tally.without_pose)
+    std::printf("   left out        %s: its pose cannot be seen\n", name.c_str());
   std::printf("   strangers       %u of %u unknown\n", tally.strangers_right, tally.strangers);
   std::printf("   empty table     %u of %u seen as empty\n", tally.empty_right, tally.empty);
 
@@ -232,7 +245,8 @@ bool report(Tally& tally, const std::vector<std::string>& symmetric_learned) {
   for (const std::string& name : tally.without_pose)
     if (std::find(symmetric_learned.begin(), symmetric_learned.end(), name) == symmetric_learned.end()) {
       honest = false;
-      std::printf("   WRONG           %s has a pose that can be seen, and the model says it has none\n", name.c_str());
+      std::printf("   WRONG           %s has a pose that can be seen, and the model says it has none\n",
+                  name.c_str());
     }
   return honest && tally.known_right == tally.known && tally.strangers_right == tally.strangers &&
          tally.empty_right == tally.empty && !errors.empty() && mean < 1.0;
@@ -252,11 +266,13 @@ int run(const Options& options) {
   for (const auto& object : catalogue)
     if (object.symmetric) symmetric.push_back(object.name);
 
-  std::printf("\n1. Acquire: the daemon turns the table through Modbus and takes %zu image sets\n", learned.size());
+  std::printf("\n1. Acquire: the daemon turns the table through Modbus and takes %zu image sets\n",
+              learned.size());
   acquire(api, lab, learned);
   std::printf("\n2. Learn: the views become manifolds in one eigenspace\n");
   learn(api);
-  std::printf("\n3. Watch: %u placements at random poses; * marks a stranger that was never learned\n\n", options.placements);
+  std::printf("\n3. Watch: %u placements at random poses; * marks a stranger that was never learned\n\n",
+              options.placements);
   std::printf("    #  placed            truth   said               pose    error\n");
   const json objects = api.get("/v1/objects");
   Tally tally;
@@ -276,10 +292,16 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   eigenpose::Options options;
-  CLI::App app{"Plays the main job against a daemon on the simulated lab, and compares every answer with the truth."};
-  app.add_option("--runtime-dir", options.runtime_dir, "where the daemon's sockets are")->capture_default_str();
-  app.add_option("--objects", options.objects, "how many objects to learn")->capture_default_str()->check(CLI::Range(1, 100));
-  app.add_option("--placements", options.placements, "how many placements to watch")->capture_default_str()->check(CLI::Range(1, 10000));
+  CLI::App app{
+      "Plays the main job against a daemon on the simulated lab, and compares every answer with the truth."};
+  app.add_option("--runtime-dir", options.runtime_dir, "where the daemon's sockets are")
+      ->capture_default_str();
+  app.add_option("--objects", options.objects, "how many objects to learn")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
+  app.add_option("--placements", options.placements, "how many placements to watch")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
   app.add_option("--seed", options.seed, "chooses objects, poses and order")->capture_default_str();
   app.add_option("--pictures", options.pictures, "save the picture of every placement into this folder");
   CLI11_PARSE(app, argc, argv);
