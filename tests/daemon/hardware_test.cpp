@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/base/error.h"
 #include "daemon/hardware/checkup.h"
@@ -138,7 +139,8 @@ TEST_F(HandControlTest, LampIsLitWithinItsRangeAndGoesDarkAtTheEnd) {
 /// A machine made of files.
 class CheckupTest : public testing::Test {
  protected:
-  CheckupTest() : root_(fs::path(testing::TempDir()) / "eigenpose-machine") {
+  // One folder a process: ctest runs several cases at a time.
+  CheckupTest() : root_(fs::path(testing::TempDir()) / ("eigenpose-machine-" + std::to_string(::getpid()))) {
     fs::remove_all(root_);
     fs::create_directories(root_ / "dev");
     machine_.root = root_;
