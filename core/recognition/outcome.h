@@ -27,7 +27,10 @@ std::string_view verdict_name(Verdict verdict);
 struct Hypothesis {
   std::string object;
   std::vector<double> q;  ///< pose: m values in the units of the object's workspace, canonical
-  double distance = 0.0;  ///< in the eigenspace, between unit-energy appearances; 0…2
+  /// Smaller is nearer. A model with windows (the default): 1 − the object's share of the votes, 0…1.
+  /// Without: Euclidean in the eigenspace, between unit-energy appearances, 0…2. Compare only within one
+  /// model.
+  double distance = 0.0;
 };
 
 /// The answer for one region.
