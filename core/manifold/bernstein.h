@@ -79,12 +79,22 @@ class MinimizeScratch {
 /// Depth of halvings at which a piece is as small as double precision resolves.
 inline constexpr std::size_t max_halvings = 60;
 
-/// Global minimum over [0,1]^m, if it is at most `cut`: branch and bound on the coefficients; a piece whose
-/// Hessian is positive definite everywhere (scaled Gershgorin test on the Bernstein coefficients of its
-/// entries) is finished by projected Newton, whose convex duality gap is the proof. The polynomial is a
-/// squared distance: the square root of the value found is within `distance_tolerance` of the square root of
-/// the minimum.
+/// Where the polynomial's domain goes on beyond the unit cube, in another polynomial that joins this one with
+/// equal first derivatives.
+struct Joints {
+  std::array<bool, max_axes> low{};   ///< beyond u_a = 0
+  std::array<bool, max_axes> high{};  ///< beyond u_a = 1
+};
+
+/// Global minimum over [0,1]^m, if it is at most `cut`: branch and bound on the coefficients.
+///
+/// A piece on which p rises or falls all the way along an axis (all first differences of one sign) has its
+/// minimum on that face; where p goes on beyond it, lower values stand there, and the piece is left out. So
+/// with `joints` "not found" may also mean that the neighbour comes lower. A piece whose Hessian is positive
+/// definite everywhere (by the ranges of its entries, their middle taken as unit) is finished by
+/// projected Newton, whose convex duality gap is the proof. The polynomial is a squared distance: the square
+/// root of the value found is within `distance_tolerance` of the square root of the minimum.
 Minimum minimize(const Shape& shape, const double* coefficients, double cut, double rounding,
-                 double distance_tolerance, MinimizeScratch& scratch);
+                 double distance_tolerance, const Joints& joints, MinimizeScratch& scratch);
 
 }  // namespace eigenpose::bernstein

@@ -11,7 +11,7 @@ double* MinimizeScratch::level(std::size_t depth, std::size_t size) {
 }
 
 void MinimizeScratch::reserve(std::size_t size) {
-  if (memory_.size() < size * (max_halvings + 2)) memory_.resize(size * (max_halvings + 2));
+  if (memory_.size() < size * (max_halvings + 4)) memory_.resize(size * (max_halvings + 4));
 }
 
 namespace {
@@ -184,72 +184,153 @@ Descent descend(const Shape& shape, const double* b, Vector u, double enough) {
   return result;
 }
 
-/// Largest |first difference| along an axis, the part of the polynomial that depends on it.
-double dependence(const Shape& shape, const double* b, int axis) {
+/// First differences along an axis; `out` has one entry less there. @returns their shape.
+Shape difference(const Shape& shape, int axis, const double* in, double* out) {
   const std::size_t inner = shape.stride(axis);
-  const auto count = static_cast<std::size_t>(shape.degree[axis] + 1);
+  const std::size_t block = inner * static_cast<std::size_t>(shape.degree[axis] + 1);
+  const std::size_t steps = block - inner;
   const std::size_t size = shape.size();
-  double largest = 0.0;
-  for (std::size_t base = 0; base < size; base += inner * count)
-    for (std::size_t i = 0; i + inner < inner * count; ++i)
-      largest = std::max(largest, std::abs(b[base + i + inner] - b[base + i]));
-  return largest;
+  for (std::size_t base = 0; base < size; base += block, out += steps)
+    for (std::size_t i = 0; i < steps; ++i) out[i] = in[base + inner + i] - in[base + i];
+  Shape result = shape;
+  --result.degree[axis];
+  return result;
 }
 
-/// Whether the Hessian is positive definite on the whole piece: with smallest diagonal entries d and largest
-/// magnitudes h beside it, the matrix (d, −h) being positive definite bounds every Hessian from below. Axes
-/// on which p does not depend beyond `rounding` are left out.
-bool is_convex(const Shape& shape, const double* b, const Vector& depends, double rounding) {
-  const int m = shape.axes;
-  Matrix bound{};
+Range range_of(const double* values, std::size_t count) {
+  Range range{values[0], values[0]};
+  for (std::size_t i = 1; i < count; ++i) {
+    range.low = std::min(range.low, values[i]);
+    range.high = std::max(range.high, values[i]);
+  }
+  return range;
+}
+
+/// Keeps of the coefficients, in place, the first or last along an axis; the shape loses the axis' degree.
+void take_face(Shape& shape, double* b, int axis, bool last) {
+  const std::size_t inner = shape.stride(axis);
+  const std::size_t outer = inner * static_cast<std::size_t>(shape.degree[axis] + 1);
   const std::size_t size = shape.size();
+  const std::size_t from = last ? outer - inner : 0;
+  double* to = b;
+  for (std::size_t base = 0; base < size; base += outer, to += inner)
+    std::copy(b + base + from, b + base + from + inner, to);
+  shape.degree[axis] = 0;
+}
+
+/// A descent that only bounds what others must stay below ends when it is this near to its minimum.
+constexpr double rough_share = 1e-3;
+
+/// Slopes smaller than this many times the rounding of a coefficient may be 0.
+constexpr double sure_slope = 16.0;
+
+/// The lower triangular factor's inverse, magnitudes only.
+Matrix magnitude_of_inverse(const Matrix& factor, int n) {
+  Matrix inverse{};
+  for (int j = 0; j < n; ++j) {
+    inverse[j][j] = 1.0 / factor[j][j];
+    for (int i = j + 1; i < n; ++i) {
+      double sum = 0.0;
+      for (int k = j; k < i; ++k) sum -= factor[i][k] * inverse[k][j];
+      inverse[i][j] = sum / factor[i][i];
+    }
+  }
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j) inverse[i][j] = std::abs(inverse[i][j]);
+  return inverse;
+}
+
+/// Whether the Hessian is positive definite on the whole piece. Each of its entries has a range, from the
+/// second differences of the coefficients: with the middles C = L Lᵀ and the half widths R, every Hessian is
+/// L (I + E) Lᵀ with |E| ≤ |L⁻¹| R |L⁻ᵀ|, and positive definite where the row sums of that stay below 1. Axes
+/// on which p does not depend beyond `rounding` are left out. @param work room for twice the coefficients.
+bool is_convex(const Shape& shape, const double* b, const Vector& depends, double rounding, double* work) {
   std::array<int, max_axes> axis{};
   int count = 0;
-  for (int a = 0; a < m; ++a)
-    if (depends[a] > rounding) axis[count++] = a;
-  for (int x = 0; x < count; ++x) {
-    const int a = axis[x];
-    const int n = shape.degree[a];
-    const std::size_t step = shape.stride(a);
-    double smallest = std::numeric_limits<double>::infinity();
-    if (n < 2) return false;
-    for (std::size_t base = 0; base < size; base += step * static_cast<std::size_t>(n + 1))
-      for (std::size_t i = base; i < base + step * static_cast<std::size_t>(n - 1); ++i)
-        smallest = std::min(smallest, b[i] - 2.0 * b[i + step] + b[i + 2 * step]);
-    if (!(smallest > 0.0)) return false;
-    bound[x][x] = n * (n - 1) * smallest;
+  for (int a = 0; a < shape.axes; ++a) {
+    if (depends[a] <= rounding) continue;
+    if (shape.degree[a] < 2) return false;
+    axis[count++] = a;
   }
-  for (int x = 0; x < count; ++x)
-    for (int y = x + 1; y < count; ++y) {
-      const std::size_t outer = shape.stride(axis[x]);
-      const std::size_t inner = shape.stride(axis[y]);
-      const auto n_outer = static_cast<std::size_t>(shape.degree[axis[x]]);
-      const auto n_inner = static_cast<std::size_t>(shape.degree[axis[y]]);
-      double largest = 0.0;
-      for (std::size_t i = 0; i + outer + inner < size; ++i) {
-        if ((i / outer) % (n_outer + 1) == n_outer || (i / inner) % (n_inner + 1) == n_inner) continue;
-        largest = std::max(largest, std::abs(b[i + outer + inner] - b[i + outer] - b[i + inner] + b[i]));
-      }
-      bound[y][x] = bound[x][y] = -static_cast<double>(n_outer * n_inner) * largest;
+  double* once = work;
+  double* twice = work + shape.size();
+  Matrix middle{};
+  Matrix half{};
+  // The diagonal first: it mostly tells.
+  for (int apart = 0; apart < count; ++apart)
+    for (int x = 0, y = apart; y < count; ++x, ++y) {
+      const Shape first = difference(shape, axis[x], b, once);
+      const Shape second = difference(first, axis[y], once, twice);
+      const Range range = range_of(twice, second.size());
+      if (apart == 0 && !(range.low > 0.0)) return false;
+      const int n = shape.degree[axis[x]];
+      const double scale = n * (apart == 0 ? n - 1 : shape.degree[axis[y]]);
+      middle[x][y] = middle[y][x] = 0.5 * scale * (range.low + range.high);
+      half[x][y] = half[y][x] = 0.5 * scale * (range.high - range.low);
     }
-  return factor(bound, count);
+  if (!factor(middle, count)) return false;
+  const Matrix inverse = magnitude_of_inverse(middle, count);
+  for (int i = 0; i < count; ++i) {
+    double sum = 0.0;
+    for (int j = 0; j < count; ++j)
+      for (int x = 0; x <= i; ++x)
+        for (int y = 0; y <= j; ++y) sum += inverse[i][x] * half[x][y] * inverse[j][y];
+    // Less than 1 by more than rounding of these few operations.
+    if (!(sum < 1.0 - 1e-9)) return false;
+  }
+  return true;
 }
 
 struct Piece {
   Vector start{};
   Vector width{};
+  Shape shape;
 };
+
+/// Shrinks the piece to the faces on which its minimum certainly stands. @returns whether lower values
+/// certainly stand beyond one of these faces.
+bool comes_lower_outside(Piece& piece, double* b, double rounding, const Joints& joints, Vector& depends,
+                         double* work) {
+  bool outside = false;
+  for (int a = 0; a < piece.shape.axes; ++a) {
+    depends[a] = 0.0;
+    if (piece.shape.degree[a] == 0) continue;
+    const Range along = range_of(work, difference(piece.shape, a, b, work).size());
+    depends[a] = std::max(std::abs(along.low), std::abs(along.high));
+    const bool rises = along.low > sure_slope * rounding;
+    const bool falls = along.high < -sure_slope * rounding;
+    if (!rises && !falls) continue;
+    const bool inside = rises ? piece.start[a] > 0.0 : piece.start[a] + piece.width[a] < 1.0;
+    outside = outside || inside || (rises ? joints.low[a] : joints.high[a]);
+    take_face(piece.shape, b, a, falls);
+    if (falls) piece.start[a] += piece.width[a];
+    piece.width[a] = 0.0;
+    a = -1;  // on the face other slopes may be clear
+  }
+  return outside;
+}
+
+/// The place of coefficient number `at` if the coefficients stood evenly spread.
+Vector place_of(const Shape& shape, std::size_t at) {
+  Vector u{};
+  for (int a = 0; a < shape.axes; ++a) {
+    const auto n = static_cast<std::size_t>(shape.degree[a]);
+    if (n > 0) u[a] = static_cast<double>(at / shape.stride(a) % (n + 1)) / static_cast<double>(n);
+  }
+  return u;
+}
 
 }  // namespace
 
 Minimum minimize(const Shape& shape, const double* coefficients, double cut, double rounding,
-                 double distance_tolerance, MinimizeScratch& scratch) {
+                 double distance_tolerance, const Joints& joints, MinimizeScratch& scratch) {
   const int m = shape.axes;
   const std::size_t size = shape.size();
   scratch.reserve(size);
   std::array<Piece, max_halvings + 1> pieces;
   pieces[0].start.fill(0.0);
   pieces[0].width.fill(1.0);
+  pieces[0].shape = shape;
   std::copy(coefficients, coefficients + size, scratch.level(0, size));
   std::size_t count = 1;
   Minimum best;
@@ -269,26 +350,28 @@ Minimum minimize(const Shape& shape, const double* coefficients, double cut, dou
   };
   bool first = true;
   while (count > 0) {
-    const Piece piece = pieces[--count];
+    Piece piece = pieces[--count];
     double* b = scratch.level(count, size);
-    const auto lowest = static_cast<std::size_t>(std::min_element(b, b + size) - b);
-    if (b[lowest] > worthwhile()) continue;
+    std::size_t used = piece.shape.size();
+    if (*std::min_element(b, b + used) > worthwhile()) continue;
     Vector depends{};
+    const bool outside =
+        comes_lower_outside(piece, b, rounding, joints, depends, scratch.level(max_halvings + 2, size));
+    if (outside && !first) continue;
+    used = piece.shape.size();
+    const auto lowest = static_cast<std::size_t>(std::min_element(b, b + used) - b);
+    if (b[lowest] > worthwhile()) continue;
     int widest = 0;
-    for (int a = 0; a < m; ++a) {
-      depends[a] = dependence(shape, b, a);
+    for (int a = 1; a < m; ++a)
       if (depends[a] > depends[widest]) widest = a;
-    }
-    const bool convex = is_convex(shape, b, depends, rounding);
+    const bool convex =
+        !outside && is_convex(piece.shape, b, depends, rounding, scratch.level(max_halvings + 2, size));
     if (convex || first) {
-      Vector u{};
-      for (int a = 0; a < m; ++a) {
-        const auto n = static_cast<std::size_t>(shape.degree[a]);
-        u[a] = static_cast<double>(lowest / shape.stride(a) % (n + 1)) / static_cast<double>(n);
-      }
-      const Descent end = descend(shape, b, u, rounding);
+      // Of a patch that is left out, the lowest place of its face still bounds what others must stay below.
+      const double enough = convex ? rounding : rough_share * std::abs(b[lowest]) + rounding;
+      const Descent end = descend(piece.shape, b, place_of(piece.shape, lowest), enough);
       offer(piece, end.u, end.value);
-      if (convex && end.value - end.gap > worthwhile() - rounding) continue;
+      if (outside || (convex && end.value - end.gap > worthwhile() - rounding)) continue;
     }
     first = false;
     if (depends[widest] <= rounding || piece.width[widest] < 1e-12 || count + 2 > max_halvings) {
@@ -297,23 +380,14 @@ Minimum minimize(const Shape& shape, const double* coefficients, double cut, dou
       continue;
     }
     double* high = scratch.level(count + 1, size);
-    split(shape, widest, b, b, high);
+    split(piece.shape, widest, b, b, high);
+    piece.width[widest] *= 0.5;
     pieces[count] = pieces[count + 1] = piece;
-    pieces[count].width[widest] = pieces[count + 1].width[widest] = 0.5 * piece.width[widest];
-    pieces[count + 1].start[widest] += 0.5 * piece.width[widest];
-    // The corner of each half with the lowest value is an answer already.
-    for (std::size_t half = 0; half < 2; ++half) {
-      const double* c = scratch.level(count + half, size);
-      for (int corner = 0; corner < 1 << m; ++corner) {
-        std::size_t at = 0;
-        Vector u{};
-        for (int a = 0; a < m; ++a)
-          if (corner >> a & 1) {
-            at += shape.stride(a) * static_cast<std::size_t>(shape.degree[a]);
-            u[a] = 1.0;
-          }
-        offer(pieces[count + half], u, c[at]);
-      }
+    pieces[count + 1].start[widest] += piece.width[widest];
+    // The nearer half is looked at first.
+    if (*std::min_element(b, b + used) < *std::min_element(high, high + used)) {
+      std::swap_ranges(b, b + used, high);
+      std::swap(pieces[count], pieces[count + 1]);
     }
     count += 2;
   }

@@ -285,8 +285,17 @@ bool PatchSet::closest(std::size_t patch, const double* point, double cut, Patch
   } else if (shape.axes == 1) {
     minimum = bernstein::minimize_curve(family.squared.degree[0], memory.a.data(), cut, rounding);
   } else {
+    // Splines of degree 2 and more join with equal derivatives, around the seam of a closed axis too.
+    bernstein::Joints joints;
+    for (int a = 0; a < shape.axes; ++a) {
+      const std::size_t axis = family.axis[a];
+      const bool smooth = shape.degree[a] >= 2;
+      const bool closed = manifold.axes()[axis].dof.periodic;
+      joints.low[a] = smooth && (closed || segments[axis] > 0);
+      joints.high[a] = smooth && (closed || segments[axis] + 1 < manifold.bases()[axis].segments());
+    }
     minimum = bernstein::minimize(family.squared, memory.a.data(), cut, rounding, patch_distance_tolerance,
-                                  memory.minimize);
+                                  joints, memory.minimize);
   }
   if (!minimum.found) return false;
   result.u = {};

@@ -53,7 +53,8 @@ class PatchSet {
   /// K × Π(p+1) Bézier points, last axis fastest, of the axes that are not constant.
   [[nodiscard]] Eigen::MatrixXd bezier(std::size_t patch) const;
 
-  /// The closest point of the patch, if its squared distance is at most `cut`. @param point K numbers.
+  /// The closest point of the patch, if its squared distance is at most `cut`; on m ≥ 2 DOFs also not where
+  /// the manifold certainly comes nearer in a neighbouring patch. @param point K numbers.
   [[nodiscard]] bool closest(std::size_t patch, const double* point, double cut, PatchPoint& result) const;
 
   /// The DOF values of a place, canonical; entries beyond m are 0.
