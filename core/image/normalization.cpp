@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/image/image_type.h"
 #include "core/image/resize_kernels.h"
 
 namespace eigenpose {
@@ -14,10 +15,41 @@ float luma(float blue, float green, float red) {
   return 0.114F * blue + 0.587F * green + 0.299F * red;
 }
 
+/// A pixel of range counts as measured when this share of its area was.
+constexpr float least_measured = 0.5F;
+
 }  // namespace
 
-int appearance_bands(const NormalizationOptions& options) {
+void set_image_type(NormalizationOptions& options, const std::string& type) {
+  const ImageTypeSum sum = parse_image_type(type);
+  options.color = sum.need == PictureNeed::color;
+  options.type = type == "grey" || type == "color" ? "" : type;
+}
+
+std::string image_type_name(const NormalizationOptions& options) {
+  if (options.type.empty()) return options.color ? "color" : "grey";
+  return options.type;
+}
+
+int picture_bands(const NormalizationOptions& options) {
   return options.color ? 3 : 1;
+}
+
+std::size_t picture_length(const NormalizationOptions& options) {
+  return static_cast<std::size_t>(options.size) * static_cast<std::size_t>(options.size) *
+         static_cast<std::size_t>(picture_bands(options));
+}
+
+bool is_range(const NormalizationOptions& options) {
+  return !options.type.empty() && parse_image_type(options.type).need == PictureNeed::range;
+}
+
+bool appearance_is_picture(const NormalizationOptions& options) {
+  return options.type.empty();
+}
+
+int appearance_bands(const NormalizationOptions& options) {
+  return options.type.empty() ? picture_bands(options) : parse_image_type(options.type).bands;
 }
 
 std::size_t appearance_length(const NormalizationOptions& options) {
@@ -25,7 +57,7 @@ std::size_t appearance_length(const NormalizationOptions& options) {
          static_cast<std::size_t>(appearance_bands(options));
 }
 
-Normalizer::Normalizer(const NormalizationOptions& options) : options_(options) {
+Normalizer::Normalizer(const NormalizationOptions& options) : options_(options), range_(is_range(options)) {
   if (options.size < 8 || options.size > 256)
     throw std::invalid_argument("the side of an appearance is " + std::to_string(options.size) +
                                 " pixels, allowed are 8 to 256");
@@ -61,6 +93,13 @@ const float* Normalizer::row(const cv::Mat& cut, const std::array<std::uint8_t, 
   if (cut.type() == CV_16UC1) {
     const auto* pixels = cut.ptr<std::uint16_t>(y);
     const float base = 256.0F * level[0];
+    if (range_) {
+      for (std::size_t x = 0; x < width; ++x) {
+        converted_[2 * x] = std::max(0.0F, static_cast<float>(pixels[x]) - base);
+        converted_[2 * x + 1] = pixels[x] > 0 ? 1.0F : 0.0F;
+      }
+      return converted_.data();
+    }
     for (std::size_t x = 0; x < width; ++x)
       converted_[x] = std::max(0.0F, static_cast<float>(pixels[x]) - base) / 256.0F;
     return converted_.data();
@@ -75,17 +114,20 @@ const float* Normalizer::row(const cv::Mat& cut, const std::array<std::uint8_t, 
 }
 
 float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level,
-                            std::span<float> appearance) {
+                            std::span<float> picture) {
   if (cut.empty() || (cut.type() != CV_8UC1 && cut.type() != CV_8UC3 && cut.type() != CV_16UC1))
     throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
                                 cv::typeToString(cut.type()));
   if (options_.color && cut.channels() != 3)
     throw std::invalid_argument("the model was learned in colour, the picture is grey; learn with --grey");
-  if (appearance.size() != length())
-    throw std::invalid_argument("an appearance has " + std::to_string(length()) + " numbers, room is for " +
-                                std::to_string(appearance.size()));
+  if (range_ && cut.type() != CV_16UC1)
+    throw std::invalid_argument("the model was learned from range, the picture is not 16-bit grey but " +
+                                cv::typeToString(cut.type()));
+  if (picture.size() != length())
+    throw std::invalid_argument("a normalised picture has " + std::to_string(length()) +
+                                " numbers, room is for " + std::to_string(picture.size()));
   const auto n = static_cast<std::size_t>(options_.size);
-  const auto bands = static_cast<std::size_t>(appearance_bands(options_));
+  const auto bands = range_ ? std::size_t{2} : static_cast<std::size_t>(picture_bands(options_));
   const auto width = static_cast<std::size_t>(cut.cols) * bands;
   const int square = std::max(cut.rows, cut.cols);
   prepare(vertical_, cut.rows, square);
@@ -137,9 +179,16 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
       }
     }
   };
-  for (std::size_t i = 0; i < n; ++i) sum_row(sums_.data() + i * width, appearance.data() + i * n * bands);
+  if (range_) depths_.resize(n * n * bands);
+  float* out = range_ ? depths_.data() : picture.data();
+  for (std::size_t i = 0; i < n; ++i) sum_row(sums_.data() + i * width, out + i * n * bands);
+  if (range_)
+    for (std::size_t i = 0; i < n * n; ++i) {
+      const float measured = depths_[2 * i + 1];
+      picture[i] = measured >= least_measured ? depths_[2 * i] / measured : 0.0F;
+    }
   double energy = 0.0;
-  for (const float value : appearance) energy += static_cast<double>(value) * value;
+  for (const float value : picture) energy += static_cast<double>(value) * value;
   return static_cast<float>(std::sqrt(energy));
 }
 
@@ -187,11 +236,11 @@ void shrink_appearance(std::span<const float> appearance, int size, int bands, i
   }
 }
 
-void quantize(std::span<const float> appearance, std::span<std::uint8_t> bytes) {
-  const float largest = *std::max_element(appearance.begin(), appearance.end());
+void quantize(std::span<const float> picture, std::span<std::uint8_t> bytes) {
+  const float largest = *std::max_element(picture.begin(), picture.end());
   const float gain = largest > 0.0F ? 255.0F / largest : 0.0F;
-  for (std::size_t i = 0; i < appearance.size(); ++i)
-    bytes[i] = static_cast<std::uint8_t>(std::lround(appearance[i] * gain));
+  for (std::size_t i = 0; i < picture.size(); ++i)
+    bytes[i] = static_cast<std::uint8_t>(std::lround(picture[i] * gain));
 }
 
 }  // namespace eigenpose

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -18,7 +19,10 @@ namespace eigenpose {
 /// How a region becomes an appearance. Part of the model: learned and watched views must agree.
 struct NormalizationOptions {
   int size = 64;      ///< side of the square appearance, pixels; 8…256
-  bool color = true;  ///< three bands normalised jointly; false: grey
+  bool color = true;  ///< pictures of three bands, normalised jointly; false: of one
+  /// What of the picture is compared: an image type or a sum of them (image_type.h). Empty: its brightness,
+  /// in colour or grey as `color` says.
+  std::string type = {};
   /// Pictures are ready-cut: each is one object, taken whole.
   bool cropped = false;
   /// How regions are found where pictures are not cropped.
@@ -27,11 +31,26 @@ struct NormalizationOptions {
   friend bool operator==(const NormalizationOptions&, const NormalizationOptions&) = default;
 };
 
-/// Numbers of one appearance: size × size × bands. Order: row by row, in a row pixel by pixel, in a pixel
-/// blue, green, red (or grey alone).
-std::size_t appearance_length(const NormalizationOptions& options);
+/// Sets `type` and the `color` that it needs. "grey" and "color" are kept as an empty type.
+/// @throws std::invalid_argument for a type that is not known.
+void set_image_type(NormalizationOptions& options, const std::string& type);
+/// The type's name, also where it is kept empty.
+std::string image_type_name(const NormalizationOptions& options);
+
+/// Numbers of one normalised picture: size × size × bands. Order: row by row, in a row pixel by pixel, in a
+/// pixel blue, green, red (or grey alone).
+std::size_t picture_length(const NormalizationOptions& options);
 /// 3 or 1.
+int picture_bands(const NormalizationOptions& options);
+/// Pictures are 16-bit range: not brightness.
+bool is_range(const NormalizationOptions& options);
+
+/// Numbers of one appearance, which the image type makes of a picture: size × size × bands in the same order.
+std::size_t appearance_length(const NormalizationOptions& options);
+/// Numbers a pixel: 3 or 1, more for sums of image types.
 int appearance_bands(const NormalizationOptions& options);
+/// The appearance is the picture itself: brightness, in colour or grey.
+bool appearance_is_picture(const NormalizationOptions& options);
 
 /// Scales cut-out regions. Holds scratch memory: one thread at a time; allocates nothing once it has seen the
 /// largest region.
@@ -41,20 +60,23 @@ int appearance_bands(const NormalizationOptions& options);
 /// interpolation). Beyond the box there is background, and the background's level is 0.
 class Normalizer {
  public:
-  /// @throws std::invalid_argument for a size outside 8…256.
+  /// @throws std::invalid_argument for a size outside 8…256 or an unknown image type.
   explicit Normalizer(const NormalizationOptions& options);
 
   [[nodiscard]] const NormalizationOptions& options() const { return options_; }
-  [[nodiscard]] std::size_t length() const { return appearance_length(options_); }
+  [[nodiscard]] std::size_t length() const { return picture_length(options_); }
 
-  /// The appearance of `cut`, in grey levels above the background, not yet of unit energy.
-  /// @param cut CV_8UC1, CV_8UC3 or CV_16UC1. A grey model takes colour pictures; a colour model refuses grey
-  /// ones.
+  /// The picture of `cut`, in grey levels above the background, not yet of unit energy.
+  ///
+  /// Range pictures keep the sensor's own unit: what was not measured is 0 and takes no part in the means; an
+  /// output pixel of which less than half was measured is 0.
+  /// @param cut CV_8UC1, CV_8UC3 or CV_16UC1; for range CV_16UC1. A grey model takes colour pictures; a
+  /// colour model refuses grey ones.
   /// @param level the background's level in each band, subtracted from every pixel (not below 0).
-  /// @param appearance `length()` numbers.
-  /// @return its energy ‖appearance‖; 0 for a black region, which has no direction.
+  /// @param picture `length()` numbers.
+  /// @return its energy ‖picture‖; 0 for a black region, which has no direction.
   /// @throws std::invalid_argument for a picture of the wrong kind.
-  float normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, std::span<float> appearance);
+  float normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, std::span<float> picture);
 
  private:
   /// A weighted range of source pixels for one output pixel.
@@ -72,22 +94,25 @@ class Normalizer {
   };
 
   void prepare(Axis& axis, int extent, int square) const;
-  /// Row y of the cut, converted to the appearance's bands as floats above the background.
+  /// Row y of the cut, converted to the picture's bands as floats above the background; of range: depth where
+  /// measured, and 1 where measured.
   const float* row(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, int y);
 
   NormalizationOptions options_;
+  bool range_ = false;
   Axis vertical_;
   Axis horizontal_;
   std::vector<float> converted_;  ///< one source row
   std::vector<float> sums_;       ///< N rows of width × bands: the cut, averaged vertically
+  std::vector<float> depths_;     ///< of range: N × N pixels of depth and share measured
 };
 
 /// An appearance of size×size pixels averaged down to side×side; exact area means. @pre side ≤ size.
 void shrink_appearance(std::span<const float> appearance, int size, int bands, int side,
                        std::span<float> reduced);
 
-/// The appearance as bytes: scaled so that its largest value is 255, then rounded. What learning keeps,
-/// because inner products of bytes are exact integers. @pre equal sizes.
-void quantize(std::span<const float> appearance, std::span<std::uint8_t> bytes);
+/// The picture as bytes: scaled so that its largest value is 255, then rounded. What learning keeps,
+/// because inner products of bytes are exact integers. @pre equal sizes, nothing below 0.
+void quantize(std::span<const float> picture, std::span<std::uint8_t> bytes);
 
 }  // namespace eigenpose

@@ -273,16 +273,26 @@ std::vector<double> RbfRecognizer::pose(std::size_t manifold,
   return q;
 }
 
-RbfRecognizer::Estimate RbfRecognizer::recognize(const Eigen::Ref<const Eigen::VectorXd>& point) const {
+Eigen::VectorXd RbfRecognizer::scores(const Eigen::Ref<const Eigen::VectorXd>& point) const {
   if (point.size() != dimensions_)
     throw std::invalid_argument("the networks take " + std::to_string(dimensions_) +
                                 " numbers, the point has " + std::to_string(point.size()));
+  return object_.evaluate(point);
+}
+
+RbfRecognizer::Estimate RbfRecognizer::recognize(const Eigen::Ref<const Eigen::VectorXd>& point) const {
   Estimate estimate;
   Eigen::Index winner = 0;
-  estimate.score = object_.evaluate(point).maxCoeff(&winner);
+  estimate.score = scores(point).maxCoeff(&winner);
   estimate.manifold = static_cast<std::size_t>(winner);
   estimate.q = pose(estimate.manifold, point);
   return estimate;
+}
+
+std::size_t RbfRecognizer::memory() const {
+  std::size_t bytes = object_.memory();
+  for (const RbfNetwork& network : poses_) bytes += network.memory();
+  return bytes;
 }
 
 std::size_t RbfRecognizer::units() const {

@@ -52,6 +52,9 @@ class RbfNetwork {
   /// L outputs. @pre point.size() == K.
   [[nodiscard]] Eigen::VectorXd evaluate(const Eigen::Ref<const Eigen::VectorXd>& point) const;
   [[nodiscard]] std::size_t units() const { return static_cast<std::size_t>(centres_.cols()); }
+  [[nodiscard]] std::size_t memory() const {
+    return sizeof(double) * static_cast<std::size_t>(centres_.size() + exponent_.size() + weights_.size());
+  }
 
  private:
   Eigen::MatrixXd centres_;   ///< K × units
@@ -75,10 +78,13 @@ class RbfRecognizer {
 
   /// @throws std::invalid_argument when point.size() ≠ K.
   [[nodiscard]] Estimate recognize(const Eigen::Ref<const Eigen::VectorXd>& point) const;
+  /// The outputs of all objects. @throws std::invalid_argument when point.size() ≠ K.
+  [[nodiscard]] Eigen::VectorXd scores(const Eigen::Ref<const Eigen::VectorXd>& point) const;
   /// The pose alone, of a known object.
   [[nodiscard]] std::vector<double> pose(std::size_t manifold,
                                          const Eigen::Ref<const Eigen::VectorXd>& point) const;
   [[nodiscard]] std::size_t units() const;
+  [[nodiscard]] std::size_t memory() const;
   /// Networks whose error bound was not met at the samples (two samples too alike).
   [[nodiscard]] std::size_t unmet() const { return unmet_; }
 

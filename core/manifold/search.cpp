@@ -7,6 +7,7 @@
 #include "core/manifold/best_list.h"
 #include "core/manifold/exhaustive_search.h"
 #include "core/manifold/flann_search.h"
+#include "core/manifold/rbf_search.h"
 #include "core/manifold/slab_search.h"
 #include "core/manifold/tree_search.h"
 
@@ -30,8 +31,9 @@ std::unique_ptr<ManifoldSearch> make_search(std::string_view kind, std::span<con
   if (kind == "exhaustive") return std::make_unique<ExhaustiveSearch>(manifolds);
   if (kind == "flann") return std::make_unique<FlannSearch>(manifolds);
   if (kind == "slab") return std::make_unique<SlabSearch>(manifolds);
+  if (kind == "rbf") return std::make_unique<RbfSearch>(manifolds);
   throw std::invalid_argument("unknown search \"" + std::string(kind) +
-                              "\": tree, exhaustive, flann or slab");
+                              "\": tree, exhaustive, flann, slab or rbf");
 }
 
 std::unique_ptr<ManifoldSearch> make_search(std::span<const Manifold> manifolds) {

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t header_size = 512;  ///< HDF5 wants a power of two, at least 512
 constexpr std::string_view magic = "eigenpose model\n";
-constexpr int version = 1;
+constexpr int version = 2;
 
 using Header = std::array<char, header_size>;
 
@@ -73,6 +73,7 @@ void check_header(std::span<const unsigned char> bytes, const std::filesystem::p
 void write_normalization(const Hdf5Group& group, const NormalizationOptions& options) {
   group.write("size", std::int64_t{options.size});
   group.write("color", std::int64_t{options.color});
+  group.write("type", image_type_name(options));
   group.write("cropped", std::int64_t{options.cropped});
   group.write("least_contrast", std::int64_t{options.segmentation.least_contrast});
   group.write("noise_sigmas", options.segmentation.noise_sigmas);
@@ -83,7 +84,9 @@ void write_normalization(const Hdf5Group& group, const NormalizationOptions& opt
 NormalizationOptions read_normalization(const Hdf5Group& group) {
   NormalizationOptions options;
   options.size = static_cast<int>(group.read_integer("size"));
-  options.color = group.read_bool("color");
+  set_image_type(options, group.read_text("type"));
+  if (options.color != group.read_bool("color"))
+    throw Hdf5Failure("has an image type that does not fit its colour");
   options.cropped = group.read_bool("cropped");
   options.segmentation.least_contrast = static_cast<int>(group.read_integer("least_contrast"));
   options.segmentation.noise_sigmas = group.read_double("noise_sigmas");

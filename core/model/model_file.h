@@ -6,7 +6,7 @@
 /// of everything after it. A file in which any byte was changed, or that is cut off, is refused before HDF5
 /// sees it.
 ///
-///     /normalization   attributes size, color, cropped, …
+///     /normalization   attributes size, color, type, cropped, …
 ///     /eigenspace      mean (N), basis (K×N), eigenvalues (K), attribute total_scatter
 ///     /objects/0000…   attributes name, rejection_distance, …; coefficients (count×K);
 ///                      axes/0… attributes name, unit, lower, upper, periodic; samples (n)

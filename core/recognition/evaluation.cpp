@@ -35,7 +35,8 @@ struct Answer {
 
 /// One worker's recogniser and what it spent.
 struct Worker {
-  explicit Worker(const std::shared_ptr<const Model>& model) : recognizer(model) {}
+  Worker(const std::shared_ptr<const Model>& model, const RecognizerOptions& options)
+      : recognizer(model, options) {}
   Recognizer recognizer;
   RecognitionTimes spent;
   Duration load_time{};
@@ -114,7 +115,7 @@ void show_strangers(const std::shared_ptr<const Model>& model, std::span<const I
   std::vector<std::size_t> shown(sets.size(), 0);
   std::atomic<std::size_t> done = 0;
   parallel_for(sets.size(), options.threads, [&](std::size_t s) {
-    Worker worker(without_object(*model, s));
+    Worker worker(without_object(*model, s), options.recognizer);
     for (std::size_t i = 0; i < tests.size(); ++i) {
       if (tests[i].set != s) continue;
       if (stop.stop_requested()) throw Interrupted();
@@ -226,7 +227,7 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
 
   const unsigned threads = resolved_threads(options.threads);
   std::vector<Worker> workers;
-  for (unsigned t = 0; t < threads; ++t) workers.emplace_back(model);
+  for (unsigned t = 0; t < threads; ++t) workers.emplace_back(model, options.recognizer);
   std::vector<Answer> answers(tests.size());
   std::mutex progress_mutex;
   std::size_t done = 0;  // guarded by progress_mutex

@@ -38,6 +38,7 @@ struct EvaluationOptions {
   std::size_t learn_every = 2;
   std::size_t offset = 0;  ///< below learn_every
   LearningOptions learning;
+  RecognizerOptions recognizer;
   TestDamage damage;
   /// Also show the test views of every object to a model that does not hold it: they are strangers. The
   /// object is taken out of the learned model; eigenspaces and thresholds stay as learned with all.

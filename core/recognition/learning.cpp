@@ -43,23 +43,18 @@ void check_names(std::span<const TrainingSet> sets) {
                   "\"; learn only one of them");
 }
 
-}  // namespace
-
-namespace {
-
 /// The pictures of a store, object by object, as partial matching learns them.
 std::vector<PartsViews> parts_views(const ViewStore& views) {
-  const int size = views.normalization().size;
-  const int type = appearance_bands(views.normalization()) == 3 ? CV_8UC3 : CV_8UC1;
   std::vector<PartsViews> result;
   for (const ObjectViews& object : views.objects())
-    result.push_back({object.axes, object.count, [&views, size, type, first = object.first](std::size_t i) {
-                        cv::Mat picture(size, size, type);
-                        const auto bytes = views.bytes(first + i);
-                        std::copy(bytes.begin(), bytes.end(), picture.ptr<std::uint8_t>());
-                        return picture;
-                      }});
+    result.push_back({object.axes, object.count,
+                      [&views, first = object.first](std::size_t i) { return views.picture(first + i); }});
   return result;
+}
+
+/// Of the memory that learning may use, pictures take half at most; where they need more, they go to disk.
+ViewStoreOptions store_options(const LearningOptions& options) {
+  return {options.normalization, options.threads, options.memory_limit / 2, options.scratch_folder};
 }
 
 }  // namespace
@@ -71,7 +66,8 @@ std::vector<TrainingSet> all_views(std::span<const ImageSet> sets) {
 }
 
 Eigen::MatrixXd project_all(const AppearanceSource& source, const Eigenspace& eigenspace, unsigned threads) {
-  constexpr std::size_t tile_views = 32;
+  constexpr std::size_t tile_numbers = std::size_t{1} << 20;
+  const std::size_t tile_views = std::clamp<std::size_t>(tile_numbers / source.length(), 1, 32);
   const std::size_t count = source.count();
   Eigen::MatrixXd points(eigenspace.components(), static_cast<Eigen::Index>(count));
   const Eigen::VectorXf offset = eigenspace.basis.transpose() * eigenspace.mean;
@@ -100,9 +96,12 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
       std::all_of(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.images->cropped(); });
   options.solver.threads = options.threads;
   options.rejection.threads = options.threads;
+  // Windows and alignment look at brightness.
+  options.parts = options.parts && !is_range(options.normalization);
 
-  const ViewStore views(sets, options.normalization, options.threads, progress, stop);
+  const ViewStore views(sets, store_options(options), progress, stop);
   told.views = views.count();
+  if (options.memory_limit > 0) options.solver.memory_limit = options.memory_limit - views.resident();
   told.normalize_time = watch.lap();
 
   Model model;

@@ -2,6 +2,7 @@
 
 /// From image sets to a model (sections 3 and 4 of the paper).
 
+#include <filesystem>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -24,10 +25,15 @@ struct LearningOptions {
   /// where it is better.
   bool object_spaces = true;
   /// Learn windows and pose spaces too: matching that bears covers and misalignment. Without, only the whole
-  /// region is matched.
+  /// region is matched. They look at brightness whatever the image type is; of range there are none.
   bool parts = true;
   PartsCalibrationOptions calibration;
   unsigned threads = 0;  ///< 0: all cores. The model does not depend on it.
+  /// Memory for views and solver, bytes; 0 means no limit. Views that do not fit are kept on disk and read in
+  /// tiles. Beside it stand the model itself (windows and own spaces grow with the views) and a few pictures
+  /// a thread.
+  std::size_t memory_limit = 0;
+  std::filesystem::path scratch_folder = {};  ///< where that disk is; empty: the folder for temporary files
   /// Kept in the model's provenance.
   std::string image_sets;
   std::string program_version;

@@ -31,12 +31,11 @@ Eigen::MatrixXf reduced_views(const ViewStore& views, const ObjectViews& object)
   const int side = reduced_side(options);
   const int bands = appearance_bands(options);
   Eigen::MatrixXf reduced(Eigen::Index{side} * side * bands, static_cast<Eigen::Index>(object.count));
-  std::vector<float> appearance(views.length());
+  Eigen::MatrixXf appearance(static_cast<Eigen::Index>(views.length()), 1);
   for (std::size_t i = 0; i < object.count; ++i) {
-    const auto bytes = views.bytes(object.first + i);
-    std::copy(bytes.begin(), bytes.end(), appearance.begin());
+    views.read(object.first + i, appearance);
     auto column = reduced.col(static_cast<Eigen::Index>(i));
-    shrink_appearance(appearance, options.size, bands, side,
+    shrink_appearance({appearance.data(), views.length()}, options.size, bands, side,
                       {column.data(), static_cast<std::size_t>(column.size())});
     column.normalize();
   }

@@ -29,7 +29,7 @@ PartsStage::PartsStage(const Model& model)
     : model_(model),
       recognizer_(*model.parts),
       picture_(model.normalization.size, model.normalization.size,
-               appearance_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
+               picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
 bool PartsStage::accepted(const PartsAnswer& answer, double runner_up_share) const {
   const PartsCalibration& calibration = model_.parts->calibration[answer.object];
@@ -42,8 +42,8 @@ bool PartsStage::accepted(const PartsAnswer& answer, double runner_up_share) con
   return rest <= calibration.rejection_score;
 }
 
-void PartsStage::judge(std::span<const float> appearance, std::optional<std::size_t> sure, Outcome& outcome) {
-  quantize(appearance, {picture_.ptr<std::uint8_t>(), appearance.size()});
+void PartsStage::judge(std::span<const float> picture, std::optional<std::size_t> sure, Outcome& outcome) {
+  quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   recognizer_.look(picture_);
   if (sure) {
     recognizer_.vote({&*sure, 1});

@@ -22,9 +22,9 @@ class PartsStage {
   explicit PartsStage(const Model& model);
 
   /// Fills everything of `outcome` but its box.
-  /// @param appearance as the normaliser makes it. @param sure the object that the whole region shows beyond
+  /// @param picture as the normaliser makes it. @param sure the object that the whole region shows beyond
   /// doubt, if there is one: then the others are only asked when alignment does not agree.
-  void judge(std::span<const float> appearance, std::optional<std::size_t> sure, Outcome& outcome);
+  void judge(std::span<const float> picture, std::optional<std::size_t> sure, Outcome& outcome);
 
  private:
   void describe(const PartsAnswer& answer, double runner_up_share, Outcome& outcome) const;

@@ -6,8 +6,10 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/image/appearance_maker.h"
 #include "core/image/normalization.h"
 #include "core/image/segmentation.h"
+#include "core/manifold/pattern_rejector.h"
 #include "core/manifold/search.h"
 #include "core/recognition/own_spaces.h"
 #include "core/recognition/parts_stage.h"
@@ -71,13 +73,15 @@ bool same_valley(const Manifold& manifold, const ClosestPoint& a, const ClosestP
 
 /// The stages of recognition, each a function; what they pass on stands in the fields between them.
 struct Recognizer::Impl {
-  explicit Impl(std::shared_ptr<const Model> learned);
+  Impl(std::shared_ptr<const Model> learned, const RecognizerOptions& options);
 
   std::shared_ptr<const Model> model;
   Segmenter segmenter;
   Normalizer normalizer;
+  AppearanceMaker maker;
   std::vector<Manifold> manifolds;
   std::unique_ptr<ManifoldSearch> search;
+  std::unique_ptr<ManifoldSearch> rejector;  ///< asked first, where there is one
   OwnSpaces own_spaces;
   std::vector<PoseTable> poses;  ///< one an object
   Eigen::VectorXf mean_point;    ///< basisᵀ mean
@@ -85,6 +89,7 @@ struct Recognizer::Impl {
   std::optional<PartsStage> parts;
 
   // Scratch, reused from frame to frame.
+  std::vector<float> typed_from;  ///< the picture, where the appearance is another
   Eigen::VectorXf appearance;
   Eigen::VectorXf point;
   std::array<ClosestPoint, 3> closest;
@@ -97,8 +102,10 @@ struct Recognizer::Impl {
 
   std::span<const Region> find_regions(const cv::Mat& image);
   [[nodiscard]] bool too_small(const Region& region) const;
-  /// Fills `appearance`; returns its energy.
+  /// Fills `picture()` and `appearance`; returns the energy of the latter.
   float normalize(const cv::Mat& image, std::size_t region);
+  /// The normalised picture of the region.
+  [[nodiscard]] std::span<float> picture();
   void project(float energy);
   void find_closest();
   /// Puts first whichever close candidate explains the whole picture best, and takes the pose from where it
@@ -115,20 +122,24 @@ struct Recognizer::Impl {
   void describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found);
 };
 
-Recognizer::Impl::Impl(std::shared_ptr<const Model> learned)
+Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOptions& options)
     : model(std::move(learned)),
       segmenter(model->normalization.segmentation),
       normalizer(model->normalization),
+      maker(model->normalization),
       manifolds(manifolds_of(*model)),
-      search(make_search("tree", manifolds)),
+      search(make_search(options.search, manifolds)),
       own_spaces(*model),
       mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
+      typed_from(maker.is_picture() ? 0 : picture_length(model->normalization)),
       appearance(model->eigenspace.length()),
       point(model->eigenspace.components()) {
   poses.reserve(manifolds.size());
   for (const Manifold& manifold : manifolds) poses.emplace_back(manifold);
   for (const ModelObject& object : model->objects)
     search_bound = std::max(search_bound, search_reach * object.rejection_distance);
+  if (options.rejector && search_bound > 0.0)
+    rejector = std::make_unique<RejectionSearch>(manifolds, RejectorOptions{.distance = search_bound});
   if (model->parts) parts.emplace(*model);
 }
 
@@ -142,10 +153,18 @@ bool Recognizer::Impl::too_small(const Region& region) const {
   return std::max(region.box.width, region.box.height) < least_side_share * model->normalization.size;
 }
 
+std::span<float> Recognizer::Impl::picture() {
+  if (!maker.is_picture()) return typed_from;
+  return {appearance.data(), static_cast<std::size_t>(appearance.size())};
+}
+
 float Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
-  const std::span<float> out(appearance.data(), static_cast<std::size_t>(appearance.size()));
-  if (model->normalization.cropped) return normalizer.normalize(image, {0, 0, 0}, out);
-  return normalizer.normalize(segmenter.cut_out(image, region), segmenter.background().level, out);
+  const float energy =
+      model->normalization.cropped
+          ? normalizer.normalize(image, {0, 0, 0}, picture())
+          : normalizer.normalize(segmenter.cut_out(image, region), segmenter.background().level, picture());
+  if (maker.is_picture()) return energy;
+  return maker.make(typed_from, {appearance.data(), static_cast<std::size_t>(appearance.size())});
 }
 
 void Recognizer::Impl::project(float energy) {
@@ -156,7 +175,7 @@ void Recognizer::Impl::project(float energy) {
 }
 
 void Recognizer::Impl::find_closest() {
-  closest_count = search->nearest_into(point, closest, search_bound);
+  closest_count = (rejector ? *rejector : *search).nearest_into(point, closest, search_bound);
   // Nothing within reach: the nearest is still worth telling.
   if (closest_count == 0) closest_count = search->nearest_into(point, std::span(closest).first(1));
 }
@@ -270,10 +289,10 @@ void Recognizer::Impl::describe(std::optional<Hypothesis>& hypothesis, const Clo
   hypothesis->distance = found.distance;
 }
 
-Recognizer::Recognizer(std::shared_ptr<const Model> model) {
+Recognizer::Recognizer(std::shared_ptr<const Model> model, const RecognizerOptions& options) {
   if (model == nullptr || model->objects.empty())
     throw std::invalid_argument("a recogniser needs a model with at least one object");
-  impl_ = std::make_unique<Impl>(std::move(model));
+  impl_ = std::make_unique<Impl>(std::move(model), options);
 }
 
 Recognizer::~Recognizer() = default;
@@ -323,8 +342,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
       const Lap lap(spent.search);
       impl.find_closest();
       if (impl.parts) {
-        impl.parts->judge({impl.appearance.data(), static_cast<std::size_t>(impl.appearance.size())},
-                          impl.sure_object(), outcome);
+        impl.parts->judge(impl.picture(), impl.sure_object(), outcome);
       } else {
         impl.look_again();
         impl.judge(outcome);

@@ -24,11 +24,20 @@ struct RecognitionTimes {
   Duration total{};
 };
 
+/// How a recogniser finds the nearest manifold. Every choice but "rbf" gives the same answers.
+struct RecognizerOptions {
+  /// "tree", "exhaustive", "flann", "slab", or "rbf": networks in place of a search, approximate.
+  std::string search = "tree";
+  /// Ask a composite rejector first which manifolds are certainly too far.
+  bool rejector = false;
+};
+
 /// Recognises objects with one model. Holds scratch memory: one thread at a time; make one per thread, they
 /// share the model.
 class Recognizer {
  public:
-  explicit Recognizer(std::shared_ptr<const Model> model);
+  /// @throws std::invalid_argument for an unknown search.
+  explicit Recognizer(std::shared_ptr<const Model> model, const RecognizerOptions& options = {});
   ~Recognizer();
   Recognizer(Recognizer&&) noexcept;
   Recognizer& operator=(Recognizer&&) noexcept;

@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/image/appearance_maker.h"
 #include "core/manifold/search.h"
 #include "core/recognition/leave_out.h"
 
@@ -32,12 +33,6 @@ double root_mean_square(const std::vector<double>& values) {
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-/// A view as a picture of bytes; shares memory.
-cv::Mat as_picture(std::span<const std::uint8_t> bytes, const NormalizationOptions& options) {
-  return {options.size, options.size, CV_8UC(appearance_bands(options)),
-          const_cast<std::uint8_t*>(bytes.data())};
-}
-
 /// The view as an imperfect cut-out would show it.
 cv::Mat moved(const cv::Mat& view, const RejectionOptions& options, std::mt19937& random) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -49,7 +44,9 @@ cv::Mat moved(const cv::Mat& view, const RejectionOptions& options, std::mt19937
   warp.at<double>(0, 2) += options.shift * side * unit(random);
   warp.at<double>(1, 2) += options.shift * side * unit(random);
   cv::Mat result;
-  cv::warpAffine(view, result, warp, view.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  // A mean of distances with "not measured" would be neither.
+  const int interpolation = view.depth() == CV_16U ? cv::INTER_NEAREST : cv::INTER_LINEAR;
+  cv::warpAffine(view, result, warp, view.size(), interpolation, cv::BORDER_REPLICATE);
   return result;
 }
 
@@ -62,12 +59,13 @@ std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& o
   const Eigen::VectorXf offset = eigenspace.basis.transpose() * eigenspace.mean;
   Eigen::MatrixXf tile(length, static_cast<Eigen::Index>(options.moved_views));
   std::vector<double> distances;
+  AppearanceMaker maker(views.normalization());
+  std::vector<float> numbers(picture_length(views.normalization()));
   for (std::size_t i = object.first; i < object.first + object.count; ++i) {
-    const cv::Mat view = as_picture(views.bytes(i), views.normalization());
+    const cv::Mat view = views.picture(i);
     for (Eigen::Index c = 0; c < tile.cols(); ++c) {
-      const cv::Mat picture = moved(view, options, random);
-      const Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>> bytes(picture.data, length);
-      tile.col(c) = bytes.cast<float>();
+      picture_numbers(moved(view, options, random), numbers);
+      maker.make(numbers, {tile.col(c).data(), static_cast<std::size_t>(length)});
       tile.col(c).normalize();
     }
     const Eigen::MatrixXf projected = (eigenspace.basis.transpose() * tile).colwise() - offset;

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/image/appearance_maker.h"
 #include "core/recognition/pose_grid.h"
 
 namespace eigenpose {
@@ -22,10 +23,17 @@ struct Job {
 /// Segmenters and normalisers hold scratch memory; views are worked on by several threads.
 struct Scratch {
   explicit Scratch(const NormalizationOptions& options)
-      : segmenter(options.segmentation), normalizer(options), appearance(normalizer.length()) {}
+      : segmenter(options.segmentation),
+        normalizer(options),
+        maker(options),
+        picture(normalizer.length()),
+        appearance(appearance_length(options)) {}
   Segmenter segmenter;
   Normalizer normalizer;
+  AppearanceMaker maker;
+  std::vector<float> picture;
   std::vector<float> appearance;
+  std::vector<std::uint8_t> bytes;
 };
 
 class ScratchPool {
@@ -49,18 +57,51 @@ class ScratchPool {
   std::vector<std::unique_ptr<Scratch>> free_;  ///< guarded by mutex_
 };
 
-std::string size_text(const cv::Mat& image) {
-  return std::to_string(image.cols) + "x" + std::to_string(image.rows) +
-         (image.channels() == 3 ? " colour" : " grey");
+/// What all views of an object have in common.
+struct Kind {
+  explicit Kind(const cv::Mat& image) : size(image.size()), type(image.type()) {}
+  cv::Size size;
+  int type;
+  [[nodiscard]] std::string text() const {
+    return std::to_string(size.width) + "x" + std::to_string(size.height) +
+           (CV_MAT_CN(type) == 3           ? " colour"
+            : CV_MAT_DEPTH(type) == CV_16U ? " 16-bit grey"
+                                           : " grey");
+  }
+  friend bool operator==(const Kind&, const Kind&) = default;
+};
+
+/// The picture as it is kept. Brightness is scaled to 8 bits; range keeps its unit.
+void keep(std::span<const float> picture, bool range, std::vector<std::uint8_t>& bytes) {
+  bytes.resize(picture.size() * (range ? 2 : 1));
+  if (!range) {
+    quantize(picture, bytes);
+    return;
+  }
+  for (std::size_t i = 0; i < picture.size(); ++i) {
+    const auto value = static_cast<std::uint16_t>(std::lround(std::min(picture[i], 65535.0F)));
+    std::memcpy(bytes.data() + 2 * i, &value, 2);
+  }
+}
+
+void kept_numbers(std::span<const std::uint8_t> bytes, bool range, std::span<float> numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    std::uint16_t value = 0;
+    if (range)
+      std::memcpy(&value, bytes.data() + 2 * i, 2);
+    else
+      value = bytes[i];
+    numbers[i] = static_cast<float>(value);
+  }
 }
 
 }  // namespace
 
 float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segmenter, Normalizer& normalizer,
-                             std::span<float> appearance) {
+                             std::span<float> picture) {
   float energy = 0.0F;
   if (cropped) {
-    energy = normalizer.normalize(image, {0, 0, 0}, appearance);
+    energy = normalizer.normalize(image, {0, 0, 0}, picture);
   } else {
     const auto regions = segmenter.segment(image);
     if (regions.empty())
@@ -72,19 +113,26 @@ float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segm
       throw Error(
           "shows the object cut off by the border of the picture; move the camera back or the object in");
     const auto index = static_cast<std::size_t>(largest - regions.begin());
-    energy = normalizer.normalize(segmenter.cut_out(image, index), segmenter.background().level, appearance);
+    energy = normalizer.normalize(segmenter.cut_out(image, index), segmenter.background().level, picture);
   }
   if (!(energy > 0.0F)) throw Error("is black; light the object better or remove the view");
   return energy;
 }
 
-ViewStore::ViewStore(std::span<const TrainingSet> sets, const NormalizationOptions& options, unsigned threads,
+ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& options,
                      const Progress& progress, std::stop_token stop)
-    : options_(options), length_(appearance_length(options)) {
+    : options_(options.normalization), length_(appearance_length(options_)) {
   if (sets.empty()) throw Error("there is no image set to learn from; import or acquire one");
+  const bool range = is_range(options_);
+  picture_bytes_ = picture_length(options_) * (range ? 2 : 1);
   std::vector<Job> jobs;
   for (const TrainingSet& set : sets) {
     const auto& views = set.images->views();
+    if (range && !set.images->cropped())
+      throw FileError(
+          set.images->folder(),
+          "holds views that show more than the object; range is learned from ready-cut views: import them "
+          "with --views cropped");
     std::vector<std::size_t> chosen = set.views;
     if (chosen.empty())
       for (std::size_t i = 0; i < views.size(); ++i) chosen.push_back(i);
@@ -100,11 +148,15 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const NormalizationOptio
     for (const std::size_t place : grid.order) jobs.push_back({set.images, chosen[place]});
   }
 
-  bytes_.resize(jobs.size() * length_);
+  const std::size_t all = jobs.size() * picture_bytes_;
+  if (options.memory_limit > 0 && all > options.memory_limit)
+    on_disk_ = std::make_unique<ScratchFile>(options.scratch_folder, all);
+  else
+    pictures_.resize(all);
   energies_.resize(jobs.size());
-  std::vector<cv::Mat> first_of_set(objects_.size());
-  for (std::size_t o = 0; o < objects_.size(); ++o)
-    first_of_set[o] = jobs[objects_[o].first].images->load(jobs[objects_[o].first].view);
+  std::vector<Kind> kinds;
+  for (const ObjectViews& object : objects_)
+    kinds.emplace_back(jobs[object.first].images->load(jobs[object.first].view));
   std::vector<std::size_t> object_of(jobs.size());
   for (std::size_t o = 0; o < objects_.size(); ++o)
     std::fill_n(object_of.begin() + static_cast<std::ptrdiff_t>(objects_[o].first), objects_[o].count, o);
@@ -112,47 +164,92 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const NormalizationOptio
   ScratchPool pool(options_);
   std::mutex progress_mutex;
   std::size_t done = 0;  // guarded by progress_mutex
-  parallel_for(jobs.size(), threads, [&](std::size_t i) {
+  parallel_for(jobs.size(), options.threads, [&](std::size_t i) {
     if (stop.stop_requested()) throw Interrupted();
     const Job& job = jobs[i];
     const cv::Mat image = job.images->load(job.view);
     const auto file = job.images->folder() / job.images->views()[job.view].file;
-    const cv::Mat& first = first_of_set[object_of[i]];
-    if (image.size() != first.size() || image.type() != first.type())
-      throw FileError(file, "is " + size_text(image) + ", the first view of \"" + job.images->object() +
-                                "\" is " + size_text(first) +
-                                "; all views of an object must be alike: acquire it again");
+    const Kind kind(image);
+    const Kind& first = kinds[object_of[i]];
+    if (kind != first)
+      throw FileError(file, "is " + kind.text() + ", the first view of \"" + job.images->object() + "\" is " +
+                                first.text() + "; all views of an object must be alike: acquire it again");
     auto scratch = pool.take();
     try {
       normalize_learned_view(image, job.images->cropped(), scratch->segmenter, scratch->normalizer,
-                             scratch->appearance);
+                             scratch->picture);
+      keep(scratch->picture, range, scratch->bytes);
+      kept_numbers(scratch->bytes, range, scratch->picture);
+      energies_[i] = scratch->maker.make(scratch->picture, scratch->appearance);
+      if (!(energies_[i] > 0.0F))
+        throw Error("shows nothing of image type \"" + image_type_name(options_) +
+                    "\"; learn another type or remove the view");
     } catch (const FileError&) {
       throw;
     } catch (const std::exception& trouble) {
       throw FileError(file, trouble.what());
     }
-    const std::span<std::uint8_t> bytes(bytes_.data() + i * length_, length_);
-    quantize(scratch->appearance, bytes);
-    double energy = 0.0;
-    for (const std::uint8_t b : bytes) energy += static_cast<double>(b) * b;
-    energies_[i] = static_cast<float>(std::sqrt(energy));
+    if (on_disk_)
+      on_disk_->write(i * picture_bytes_, scratch->bytes);
+    else
+      std::memcpy(pictures_.data() + i * picture_bytes_, scratch->bytes.data(), picture_bytes_);
     pool.give_back(std::move(scratch));
     const std::lock_guard lock(progress_mutex);
     if (progress) progress({"normalising", ++done, jobs.size()});
   });
 }
 
+ViewStore::~ViewStore() = default;
+
+AppearanceShape ViewStore::shape() const {
+  const auto size = static_cast<std::size_t>(options_.size);
+  return {size, size, static_cast<std::size_t>(appearance_bands(options_))};
+}
+
+bool ViewStore::has_bytes() const {
+  return appearance_is_picture(options_);
+}
+
+const std::uint8_t* ViewStore::resident_bytes() const {
+  return has_bytes() && !on_disk_ ? pictures_.data() : nullptr;
+}
+
+void ViewStore::read_pictures(std::size_t first, std::span<std::uint8_t> bytes) const {
+  if (on_disk_)
+    on_disk_->read(first * picture_bytes_, bytes);
+  else
+    std::memcpy(bytes.data(), pictures_.data() + first * picture_bytes_, bytes.size());
+}
+
 void ViewStore::read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const {
+  AppearanceMaker maker(options_);
+  const bool range = is_range(options_);
+  std::vector<std::uint8_t> bytes(picture_bytes_);
+  std::vector<float> picture(picture_length(options_));
   for (Eigen::Index c = 0; c < tile.cols(); ++c) {
     const std::size_t i = first + static_cast<std::size_t>(c);
-    const Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>> view(
-        bytes_.data() + i * length_, static_cast<Eigen::Index>(length_));
-    tile.col(c) = view.cast<float>() / energies_[i];
+    read_pictures(i, bytes);
+    kept_numbers(bytes, range, picture);
+    auto column = tile.col(c);
+    maker.make(picture, {column.data(), length_});
+    column /= energies_[i];
   }
 }
 
 void ViewStore::read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const {
-  std::memcpy(tile, bytes_.data() + first * length_, n * length_);
+  read_pictures(first, {tile, n * picture_bytes_});
+}
+
+cv::Mat ViewStore::picture(std::size_t i) const {
+  const int type = is_range(options_) ? CV_16UC1 : CV_8UC(picture_bands(options_));
+  cv::Mat picture(options_.size, options_.size, type);
+  read_pictures(i, {picture.ptr<std::uint8_t>(), picture_bytes_});
+  return picture;
+}
+
+void picture_numbers(const cv::Mat& picture, std::span<float> numbers) {
+  const std::size_t n = numbers.size();
+  kept_numbers({picture.ptr<std::uint8_t>(), n * picture.elemSize1()}, picture.depth() == CV_16U, numbers);
 }
 
 }  // namespace eigenpose

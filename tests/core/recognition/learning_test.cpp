@@ -63,6 +63,45 @@ TEST_F(Learning, DoesNotDependOnThreads) {
   EXPECT_EQ(a.objects[1].rejection_distance, b.objects[1].rejection_distance);
 }
 
+TEST_F(Learning, GivesTheSameModelFromMemoryAndFromDisk) {
+  testing::write_turn(root(), "one", 1, 24);
+  testing::write_turn(root(), "two", 2, 24);
+  const auto sets = open_image_sets(root());
+  LearningOptions options = testing::small_learning();
+  options.solver.solver = "gram";
+  options.solver.components = 3;
+  const Model memory = learn(all_views(sets), options);
+  // Pictures may take half of it: 45 of 48. The rest is enough for the solver.
+  options.memory_limit = 90 * picture_length(options.normalization);
+  options.scratch_folder = root();
+  EXPECT_EQ(ViewStore(all_views(sets), {options.normalization, 1, options.memory_limit / 2}, {}, {}).resident(), 0U);
+  const Model disk = learn(all_views(sets), options);
+  EXPECT_EQ(disk.eigenspace.basis, memory.eigenspace.basis);
+  EXPECT_EQ(disk.objects[1].manifold.coefficients(), memory.objects[1].manifold.coefficients());
+  EXPECT_EQ(disk.objects[1].rejection_distance, memory.objects[1].rejection_distance);
+}
+
+TEST_F(Learning, ReadsViewsOfEveryTypeAlikeFromMemoryAndFromDisk) {
+  testing::write_turn(root(), "one", 1, 6);
+  const auto sets = open_image_sets(root());
+  NormalizationOptions options = testing::small_learning().normalization;
+  for (const std::string type : {"grey", "color", "gradient", "color+fourier"}) {
+    set_image_type(options, type);
+    const ViewStore memory(all_views(sets), {options, 2}, {}, {});
+    const ViewStore disk(all_views(sets), {options, 2, 1, root()}, {}, {});
+    ASSERT_EQ(disk.resident(), 0U);
+    const auto rows = static_cast<Eigen::Index>(appearance_length(options));
+    Eigen::MatrixXf a(rows, 4);
+    Eigen::MatrixXf b(rows, 4);
+    memory.read(2, a);
+    disk.read(2, b);
+    EXPECT_EQ(a, b) << type;
+    // Of unit energy up to the rounding of floats.
+    for (Eigen::Index c = 0; c < a.cols(); ++c) EXPECT_NEAR(a.col(c).norm(), 1.0F, 1e-4F) << type;
+    EXPECT_EQ(memory.has_bytes(), type == "grey" || type == "color");
+  }
+}
+
 TEST_F(Learning, NamesAnObjectWithOneView) {
   write("mug", turn(1));
   EXPECT_THAT(refusal(), AllOf(HasSubstr("mug"), HasSubstr("1 view(s)"), HasSubstr("acquire more")));
