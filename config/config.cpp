@@ -214,6 +214,7 @@ LearnOptions read_learn(const TomlTable& table) {
   if (table.has("energy")) options.energy = table.number("energy", std::nullopt, 0.01, 1.0);
   options.size = static_cast<int>(table.integer("size", options.size, 8, 256));
   options.color = table.flag("color", options.color);
+  options.type = table.text("type", "");
   table.finish();
   return options;
 }

@@ -92,6 +92,7 @@ struct LearnOptions {
   std::optional<double> energy;  ///< if set, the smallest K that keeps this share, at most `components`
   int size = 64;                 ///< side of an appearance, pixels
   bool color = true;
+  std::string type;  ///< an image type or a sum of them; empty: brightness, in colour or grey
 };
 
 /// [watch]

@@ -44,6 +44,19 @@ std::vector<ImageSet> learning_sets(const std::filesystem::path& folder,
   return sets;
 }
 
+/// @throws ConfigError for an image type that is not known.
+NormalizationOptions normalization_options(const LearnOptions& learn) {
+  NormalizationOptions options;
+  options.size = learn.size;
+  options.color = learn.color;
+  try {
+    if (!learn.type.empty()) set_image_type(options, learn.type);
+  } catch (const std::invalid_argument& wrong) {
+    throw ConfigError(std::string("[learn] type: ") + wrong.what());
+  }
+  return options;
+}
+
 }  // namespace
 
 Service::Service(Config config, Devices devices, const Clock& clock)
@@ -55,6 +68,7 @@ Service::Service(Config config, Devices devices, const Clock& clock)
       rig_(std::move(devices_.axes), std::move(devices_.lamps), clock),
       camera_(std::move(devices_.camera), clock),
       watcher_(config_.watch, camera_, models_, *results_) {
+  (void)normalization_options(config_.learn);  // a wrong image type stops the start
   models_.load();
 }
 
@@ -81,8 +95,7 @@ JobStatus Service::acquire(const std::string& object, const Plan& plan) {
 
 JobStatus Service::learn(const LearnRequest& request) {
   LearningOptions options;
-  options.normalization.size = config_.learn.size;
-  options.normalization.color = config_.learn.color;
+  options.normalization = normalization_options(config_.learn);
   options.solver.components = static_cast<std::size_t>(request.components.value_or(config_.learn.components));
   options.solver.energy = config_.learn.energy;
   options.image_sets = config_.image_sets().string();

@@ -112,6 +112,7 @@ json status_json(Service& service) {
              {"components", current->eigenspace.components()},
              {"size", current->normalization.size},
              {"color", current->normalization.color},
+             {"type", image_type_name(current->normalization)},
              {"created", current->provenance.created}};
   }
   json simulation = nullptr;

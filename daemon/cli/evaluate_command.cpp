@@ -14,6 +14,7 @@
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 #include "daemon/cli/learning_options.h"
+#include "daemon/cli/recognizer_options.h"
 
 namespace eigenpose::cli {
 namespace {
@@ -37,6 +38,7 @@ struct Options {
   std::size_t learn_every = 2;
   std::size_t offset = 0;
   LearningArguments learning;
+  RecognizerOptions recognizer;
   std::vector<std::string> perturb;
   double occlude = 0.0;
   unsigned seed = 1;
@@ -182,6 +184,7 @@ int run(const Options& options, const std::stop_token& stop) {
   evaluation.offset = options.offset;
   evaluation.learning = learning_options(options.learning, sets, options.sets);
   evaluation.threads = options.learning.threads;
+  evaluation.recognizer = options.recognizer;
   evaluation.damage = parse_damage(options);
   evaluation.leave_one_out = options.leave_one_out;
   evaluation.learning.calibration.rate = options.rejection_rate;
@@ -208,6 +211,7 @@ void add_evaluate_command(CLI::App& app, CommandLine& line) {
       ->capture_default_str();
   command->add_option("--offset", options->offset, "The first view that is learned")->capture_default_str();
   add_learning_options(*command, options->learning);
+  add_recognizer_options(*command, options->recognizer);
   command
       ->add_option(
           "--perturb", options->perturb,

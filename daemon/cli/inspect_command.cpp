@@ -9,6 +9,7 @@
 
 #include "core/model/model_file.h"
 #include "daemon/cli/commands.h"
+#include "daemon/cli/geometry_report.h"
 
 namespace eigenpose::cli {
 namespace {
@@ -20,10 +21,12 @@ The file is checked as a whole first; a damaged one is refused. It is HDF5: Pyth
 
 Examples:
   eigenpose inspect lab.model
+  eigenpose inspect lab.model --geometry
   eigenpose inspect lab.model --json)";
 
 struct Options {
   std::string model;
+  bool geometry = false;
   bool as_json = false;
 };
 
@@ -52,6 +55,7 @@ json to_json(const Model& model) {
   const Eigen::VectorXd& values = model.eigenspace.eigenvalues;
   return {{"size", model.normalization.size},
           {"color", model.normalization.color},
+          {"type", image_type_name(model.normalization)},
           {"cropped", model.normalization.cropped},
           {"components", model.eigenspace.components()},
           {"appearance_length", model.eigenspace.length()},
@@ -70,7 +74,7 @@ void print(const Model& model) {
   std::printf("learned   %s by eigenpose %s from %s\n", model.provenance.created.c_str(),
               model.provenance.program_version.c_str(), model.provenance.image_sets.c_str());
   std::printf("views     %dx%d %s, %s\n", model.normalization.size, model.normalization.size,
-              model.normalization.color ? "colour" : "grey",
+              image_type_name(model.normalization).c_str(),
               model.normalization.cropped ? "each picture taken whole" : "objects cut out of each picture");
   std::printf("space     %td dimensions by %s keep %.1f %% of the scatter\n", model.eigenspace.components(),
               model.provenance.solver.c_str(), 100.0 * model.provenance.energy);
@@ -91,10 +95,16 @@ void print(const Model& model) {
 
 int run(const Options& options) {
   const Model model = load_model(options.model);
-  if (options.as_json)
-    std::printf("%s\n", to_json(model).dump(2).c_str());
-  else
+  if (options.as_json) {
+    json all = to_json(model);
+    if (options.geometry)
+      for (std::size_t o = 0; o < model.objects.size(); ++o)
+        all["objects"][o]["geometry"] = geometry_json(model.objects[o]);
+    std::printf("%s\n", all.dump(2).c_str());
+  } else {
     print(model);
+    if (options.geometry) print_geometry(model);
+  }
   return exit_done;
 }
 
@@ -105,6 +115,8 @@ void add_inspect_command(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("inspect", "Show what a model file holds");
   command->footer(examples);
   command->add_option("model", options->model, "The model file")->required();
+  command->add_flag("--geometry", options->geometry,
+                    "Tangent, normal and curvature of the manifolds (all vectors with --json)");
   command->add_flag("--json", options->as_json, "Print it as JSON");
   command->callback([options, &line] { line.action = [options] { return run(*options); }; });
 }

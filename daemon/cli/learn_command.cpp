@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,6 +25,8 @@ Examples:
   eigenpose learn sets/coil-20 --to coil-20.model --size 128
   eigenpose learn sets/lab --to lab.model --energy 0.95 --components 60
   eigenpose learn sets/lab --to lab.model --objects mug,duck
+  eigenpose learn sets/lab --to lab.model --type grey:0.7+gradient:0.3
+  eigenpose learn sets/large --to large.model --memory-limit 256
   eigenpose learn                              the running service learns what it has acquired and watches with it
 
 The model is written at once when all is learned; a former model of that name stays until then.)";
@@ -78,7 +81,9 @@ int run(const Options& options, const CLI::App& command, const std::stop_token& 
   }
   if (options.to.empty()) throw Error("the model needs a name: add --to FILE");
   const auto sets = open_chosen_sets(options.sets, options.learning);
-  const LearningOptions learning = learning_options(options.learning, sets, options.sets);
+  LearningOptions learning = learning_options(options.learning, sets, options.sets);
+  const auto folder = std::filesystem::path(options.to).parent_path();
+  learning.scratch_folder = folder.empty() ? "." : folder;  // where there is room for the model
   ConsoleProgress progress;
   LearningReport report;
   const Model model = learn(all_views(sets), learning, &report, progress.callback(), stop);

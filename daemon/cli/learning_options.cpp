@@ -6,8 +6,50 @@
 #include <CLI/CLI.hpp>
 
 #include "core/base/error.h"
+#include "core/image/image_type.h"
 
 namespace eigenpose::cli {
+namespace {
+
+std::string type_help() {
+  std::string text = "What of a picture is compared: ";
+  for (const ImageTypeRow& row : image_types())
+    text += std::string(row.name) + " (" + std::string(row.summary) + "), ";
+  return text + "or a sum such as grey+gradient or grey:0.7+gradient:0.3";
+}
+
+/// The first view that is no colour picture.
+const ImageSet* first_grey(std::span<const ImageSet> sets) {
+  for (const ImageSet& set : sets)
+    if (set.load(0).channels() != 3) return &set;
+  return nullptr;
+}
+
+void choose_type(const LearningArguments& arguments, std::span<const ImageSet> sets,
+                 NormalizationOptions& options) {
+  const ImageSet* grey = first_grey(sets);
+  if (arguments.type.empty()) {
+    if (arguments.color && grey != nullptr)
+      throw ConfigError("--color: the views of \"" + grey->object() + "\" are grey; leave --color out");
+    options.color = !arguments.grey && grey == nullptr;
+    return;
+  }
+  try {
+    set_image_type(options, arguments.type);
+  } catch (const std::invalid_argument& wrong) {
+    throw ConfigError(std::string("--type: ") + wrong.what());
+  }
+  if (options.color && grey != nullptr)
+    throw ConfigError("--type " + arguments.type + ": the views of \"" + grey->object() +
+                      "\" are grey; colour is not to be had from them");
+  if (is_range(options))
+    for (const ImageSet& set : sets)
+      if (set.load(0).type() != CV_16UC1)
+        throw ConfigError("--type " + arguments.type + ": the views of \"" + set.object() +
+                          "\" are not 16-bit grey pictures; they hold no range");
+}
+
+}  // namespace
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--components", arguments.components, "Dimensions of the eigenspace (K)")
@@ -22,7 +64,10 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       ->capture_default_str();
   auto* color = command.add_flag("--color", arguments.color,
                                  "Use colour, all bands jointly (default if the views have it)");
-  command.add_flag("--grey", arguments.grey, "Use brightness only")->excludes(color);
+  auto* grey = command.add_flag("--grey", arguments.grey, "Use brightness only")->excludes(color);
+  command.add_option("--type", arguments.type, type_help())->excludes(color)->excludes(grey);
+  command.add_flag("--whole-region", arguments.whole_region,
+                   "Compare whole regions alone: no windows, no alignment");
   command.add_option("--solver", arguments.solver, "auto, gram, krylov, conjugate-gradient, sta or dense")
       ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "dense"}))
       ->capture_default_str();
@@ -30,6 +75,10 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       ->check(CLI::Range(1, 3))
       ->capture_default_str();
   command.add_option("--threads", arguments.threads, "Threads; 0 means all cores")->capture_default_str();
+  command
+      .add_option("--memory-limit", arguments.memory_limit_mib,
+                  "MiB for views and solver; views that do not fit are kept on disk. 0 means no limit")
+      ->check(CLI::Range(0.0, 1e9));
   command.add_option("--objects", arguments.objects, "Only these objects, e.g. obj1,obj2")->delimiter(',');
 }
 
@@ -52,17 +101,14 @@ std::vector<ImageSet> open_chosen_sets(const std::string& folder, const Learning
 LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
                                  const std::string& folder) {
   LearningOptions options;
-  const ImageSet* grey = nullptr;
-  for (const ImageSet& set : sets) {
+  for (const ImageSet& set : sets)
     if (!set.complete())
       throw FileError(set.folder(),
                       "is not complete; acquire or import it to its end, or leave it out with --objects");
-    if (grey == nullptr && set.load(0).channels() != 3) grey = &set;
-  }
-  if (arguments.color && grey != nullptr)
-    throw ConfigError("--color: the views of \"" + grey->object() + "\" are grey; leave --color out");
   options.normalization.size = arguments.size;
-  options.normalization.color = !arguments.grey && grey == nullptr;
+  choose_type(arguments, sets, options.normalization);
+  options.parts = !arguments.whole_region;
+  options.memory_limit = static_cast<std::size_t>(arguments.memory_limit_mib * 1024.0 * 1024.0);
   options.solver.solver = arguments.solver;
   options.solver.components = arguments.components;
   options.solver.energy = arguments.energy;

@@ -23,21 +23,26 @@ struct LearningArguments {
   int size = 64;
   bool color = false;
   bool grey = false;
+  std::string type;
+  bool whole_region = false;
+  double memory_limit_mib = 0.0;
   std::string solver = "auto";
   int degree = 2;
   unsigned threads = 0;
   std::vector<std::string> objects;
 };
 
-/// Adds --components, --energy, --size, --color, --grey, --solver, --degree, --threads and --objects.
+/// Adds --components, --energy, --size, --type, --color, --grey, --whole-region, --solver, --degree,
+/// --threads,
+/// --memory-limit and --objects.
 void add_learning_options(CLI::App& command, LearningArguments& arguments);
 
 /// The image sets below `folder`, only those named by --objects if any.
 /// @throws FileError, ConfigError naming an object that is not there.
 std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments);
 
-/// Colour is taken when all views are in colour, unless --color or --grey says otherwise.
-/// @throws ConfigError when --color meets a grey view.
+/// Colour is taken when all views are in colour, unless --type, --color or --grey says otherwise.
+/// @throws ConfigError for an unknown image type, or one that the views are not fit for.
 LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
                                  const std::string& folder);
 

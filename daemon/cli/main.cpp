@@ -34,6 +34,7 @@ const std::vector<AddCommand> commands = {
     add_learn_command,      //
     add_recognize_command,  //
     add_inspect_command,    //
+    add_resample_command,   //
     add_evaluate_command,   //
     add_doctor_command,     //
     add_devices_command,    //

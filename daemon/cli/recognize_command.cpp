@@ -15,6 +15,7 @@
 #include "core/recognition/recognizer.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/outcome_json.h"
+#include "daemon/cli/recognizer_options.h"
 
 namespace eigenpose::cli {
 namespace {
@@ -30,6 +31,7 @@ Examples:
 struct Options {
   std::vector<std::string> images;
   std::string model;
+  RecognizerOptions recognizer;
   bool as_json = false;
 };
 
@@ -74,7 +76,7 @@ void print(const Outcome& outcome, const Model& model) {
 
 int run(const Options& options, const std::stop_token& stop) {
   const auto model = std::make_shared<const Model>(load_model(options.model));
-  Recognizer recognizer(model);
+  Recognizer recognizer(model, options.recognizer);
   nlohmann::json all = nlohmann::json::array();
   for (const std::string& name : options.images) {
     if (stop.stop_requested()) throw Interrupted();
@@ -107,6 +109,7 @@ void add_recognize_command(CLI::App& app, CommandLine& line) {
   command->footer(examples);
   command->add_option("images", options->images, "Pictures: PNG, JPEG, PGM, PPM")->required();
   command->add_option("--model", options->model, "The model file")->required();
+  add_recognizer_options(*command, options->recognizer);
   command->add_flag("--json", options->as_json, "Print the outcomes as JSON");
   command->callback(
       [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });

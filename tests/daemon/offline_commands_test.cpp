@@ -1,0 +1,209 @@
+// The commands that need no service, run as a person runs them.
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <sys/wait.h>
+
+#include "core/image/image_set.h"
+#include "core/image/picture_file.h"
+#include "tests/support/synthetic_objects.h"
+#include "tests/support/temporary_folder.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define EIGENPOSE_SANITIZED 1
+#else
+#define EIGENPOSE_SANITIZED 0
+#endif
+
+namespace eigenpose {
+namespace {
+
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+struct Ended {
+  int code = -1;
+  std::string output;  ///< of both streams
+};
+
+Ended shell(const std::string& line) {
+  Ended result;
+  FILE* pipe = ::popen(("exec 2>&1; " + line).c_str(), "r");
+  if (pipe == nullptr) return result;
+  std::array<char, 4096> text{};
+  for (std::size_t n = 0; (n = std::fread(text.data(), 1, text.size(), pipe)) > 0;)
+    result.output.append(text.data(), n);
+  const int status = ::pclose(pipe);
+  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return result;
+}
+
+const std::string program = EIGENPOSE;
+
+class OfflineCommands : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  [[nodiscard]] Ended eigenpose(const std::string& arguments) const {
+    return shell("cd '" + folder_.path().string() + "' && '" + program + "' " + arguments);
+  }
+  void write_objects() const {
+    testing::write_turn(folder_.path() / "sets", "duck", 1, 18);
+    testing::write_turn(folder_.path() / "sets", "mug", 2, 18);
+    const auto png = encode_png(testing::scene_with(2, 120.0));
+    std::ofstream(path("mug.png"), std::ios::binary)
+        .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+  }
+
+ private:
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(OfflineCommands, KeepTheImageTypeInTheModelAndUseItEverywhere) {
+  write_objects();
+  for (const std::string type :
+       {"grey", "gradient", "laplacian", "fourier", "color+gradient", "grey:0.7+gradient:0.3"}) {
+    const Ended learned = eigenpose("learn sets --to a.model --size 32 --whole-region --type " + type);
+    ASSERT_EQ(learned.code, 0) << learned.output;
+    const json model = json::parse(eigenpose("inspect a.model --json").output);
+    EXPECT_EQ(model["type"], type);
+    const json seen = json::parse(eigenpose("recognize mug.png --model a.model --json").output);
+    ASSERT_EQ(seen[0]["outcomes"].size(), 1U) << type;
+    EXPECT_EQ(seen[0]["outcomes"][0]["object"], "mug") << type;
+  }
+}
+
+TEST_F(OfflineCommands, RefuseAnImageTypeThatIsNotThere) {
+  write_objects();
+  const Ended unknown = eigenpose("learn sets --to a.model --type edges");
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_THAT(unknown.output, AllOf(HasSubstr("\"edges\""), HasSubstr("known are grey, color")));
+  const Ended range = eigenpose("learn sets --to a.model --type range");
+  EXPECT_EQ(range.code, 1);
+  EXPECT_THAT(range.output, HasSubstr("hold no range"));
+}
+
+TEST_F(OfflineCommands, LearnAndRecognizeRange) {
+  ImageSetWriter writer(path("sets"), "ramp", turntable_workspace(), json::object(),
+                        {.cropped = true, .sync_every_view = false});
+  ImageSetWriter other(path("sets"), "step", turntable_workspace(), json::object(),
+                       {.cropped = true, .sync_every_view = false});
+  const auto view = [](bool step, int turn) {
+    cv::Mat depth(40, 40, CV_16UC1, cv::Scalar(0));
+    for (int y = 8; y < 32; ++y)
+      for (int x = 4; x < 36; ++x)
+        depth.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(
+            step ? (x < 10 + turn ? 30000 : 500 * y) : 20000 + 300 * ((x + turn) % 32) + 100 * y);
+    return depth;
+  };
+  for (int turn = 0; turn < 20; ++turn) {
+    writer.add(view(false, turn), {18.0 * turn});
+    other.add(view(true, turn), {18.0 * turn});
+  }
+  writer.finish();
+  other.finish();
+  const auto png = encode_png(view(true, 7));
+  std::ofstream(path("step.png"), std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+  const Ended learned = eigenpose("learn sets --to a.model --size 32 --type range");
+  ASSERT_EQ(learned.code, 0) << learned.output;
+  const json seen = json::parse(eigenpose("recognize step.png --model a.model --json").output);
+  EXPECT_EQ(seen[0]["outcomes"][0]["object"], "step");
+  EXPECT_NEAR(seen[0]["outcomes"][0]["q"][0].get<double>(), 126.0, 4.0) << "a fifth of a step";
+}
+
+TEST_F(OfflineCommands, EverySearchSaysTheSame) {
+  write_objects();
+  ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region").code, 0);
+  const json tree =
+      json::parse(eigenpose("recognize mug.png --model a.model --json").output)[0]["outcomes"][0];
+  EXPECT_EQ(tree["object"], "mug");
+  for (const std::string search : {"slab", "flann", "exhaustive", "tree --rejector", "rbf"}) {
+    const Ended run = eigenpose("recognize mug.png --model a.model --json --search " + search);
+    ASSERT_EQ(run.code, 0) << run.output;
+    const json said = json::parse(run.output)[0]["outcomes"][0];
+    EXPECT_EQ(said["object"], "mug") << search;
+    // Networks are approximate: within half of the 20 degrees between learned views.
+    const double tolerance = search == "rbf" ? 10.0 : 1e-3;
+    EXPECT_NEAR(said["q"][0].get<double>(), tree["q"][0].get<double>(), tolerance) << search;
+  }
+  EXPECT_EQ(eigenpose("recognize mug.png --model a.model --search guess").code, 2);
+}
+
+TEST_F(OfflineCommands, ResampleToTablesAndHdf5) {
+  write_objects();
+  ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region --components 5").code, 0);
+  ASSERT_EQ(eigenpose("resample a.model --per-turn 90 --to a.csv").output, "a-duck.csv\na-mug.csv\n");
+  std::ifstream table(path("a-mug.csv"));
+  std::string header;
+  std::getline(table, header);
+  EXPECT_EQ(header, "table [deg],e1,e2,e3,e4,e5\r");
+  std::size_t rows = 0;
+  for (std::string row; std::getline(table, row);) ++rows;
+  EXPECT_EQ(rows, 90U);
+  ASSERT_EQ(eigenpose("resample a.model --objects mug --to a.h5").code, 0);
+  EXPECT_GT(std::filesystem::file_size(path("a.h5")), 360U * 6 * sizeof(double));
+  EXPECT_THAT(eigenpose("resample a.model --to a.txt").output, HasSubstr(".csv"));
+  EXPECT_THAT(eigenpose("resample a.model --objects cat --to a.csv").output, HasSubstr("no \"cat\""));
+}
+
+TEST_F(OfflineCommands, InspectShowsTheGeometryOfManifolds) {
+  write_objects();
+  ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region").code, 0);
+  EXPECT_THAT(eigenpose("inspect a.model --geometry").output,
+              AllOf(HasSubstr("sharpest bend"), HasSubstr("mug")));
+  const json model = json::parse(eigenpose("inspect a.model --geometry --json").output);
+  const json& places = model["objects"][1]["geometry"][0]["places"];
+  ASSERT_EQ(places.size(), 18U);
+  double across = 0.0;
+  for (std::size_t k = 0; k < places[3]["tangent"].size(); ++k)
+    across += places[3]["tangent"][k].get<double>() * places[3]["normal"][k].get<double>();
+  EXPECT_NEAR(across, 0.0, 1e-9) << "the normal stands on the tangent";
+}
+
+// Views of 256 x 256 pixels, four times the memory that learning is given, in a process that may have no more
+// data than that and what the program itself takes. Without the limit the same process cannot learn them.
+TEST_F(OfflineCommands, LearnASetOfFourTimesTheMemoryLimitUnderThatLimit) {
+  if (EIGENPOSE_SANITIZED) GTEST_SKIP() << "a sanitizer needs more data than the limit: not shown here";
+  constexpr int limit_mib = 12;
+  constexpr int objects = 16;
+  constexpr int views = 4 * limit_mib * (1 << 20) / (256 * 256) / objects;
+  // The program's own data, two threads' stacks (8 MiB each), pictures being read and moved, the model.
+  constexpr int program_mib = 40;
+  for (int o = 0; o < objects; ++o) {
+    ImageSetWriter writer(path("sets"), "thing" + std::to_string(o), turntable_workspace(), json::object(),
+                          {.cropped = true, .sync_every_view = false});
+    for (int v = 0; v < views; ++v) {
+      const double angle = 6.283185307 * v / views;
+      cv::Mat picture(32, 32, CV_8UC1);
+      for (int y = 0; y < 32; ++y)
+        for (int x = 0; x < 32; ++x)
+          picture.at<std::uint8_t>(y, x) =
+              static_cast<std::uint8_t>(120.0 + 60.0 * std::cos(angle + 0.2 * x + o) +
+                                        40.0 * std::sin(2 * angle + 0.05 * o * y) + (x * y + v) % 7);
+      writer.add(picture, {360.0 * v / views});
+    }
+    writer.finish();
+  }
+  const std::string learn = "learn sets --to a.model --size 256 --whole-region --components 3 --threads 1";
+  const auto bounded = [&](const std::string& more) {
+    return shell("cd '" + path("") + "' && ulimit -d " + std::to_string((limit_mib + program_mib) * 1024) +
+                 " && '" + program + "' " + learn + more);
+  };
+  const Ended limited = bounded(" --memory-limit " + std::to_string(limit_mib));
+  ASSERT_EQ(limited.code, 0) << limited.output;
+  EXPECT_THAT(limited.output, HasSubstr("from " + std::to_string(objects * views) + " views"));
+  const Ended unlimited = bounded("");
+  EXPECT_EQ(unlimited.code, 1);
+  EXPECT_THAT(unlimited.output, HasSubstr("out of memory")) << "the limit bites";
+}
+
+}  // namespace
+}  // namespace eigenpose
