@@ -1,12 +1,13 @@
 // Every search against the oracle, on many queries.
 //
-//   search_stress [queries] [threads] [seed]     (10 million, all cores, 0)
+//   search_stress [queries] [threads] [seed] [share]     (10 million, all cores, 0, 0.002)
 //
 // Lists of a few manifolds with random K, samples, degrees, closed and open, uniform and jittered, twins
-// among them; queries near, far, on knots, at seams and between two manifolds. One list in 500 has two DOFs.
-// With EIGENPOSE_DATASETS set, 1 % of the queries are real views of COIL-100, moved a little at random. Ends
-// with status 1 where a search differs from the oracle by more than 1e-5, or names another manifold although
-// the difference is clear.
+// among them; queries near, far, on knots, at seams and between two manifolds. `share` of the queries are
+// about manifolds of several DOFs: of these 3/4 of two, 1/5 of three and the rest of four. With
+// EIGENPOSE_DATASETS set, 1 % of the queries are real views of COIL-100, moved a little at random. Ends with
+// status 1 where a search differs from the oracle by more than 1e-5, or names another manifold although the
+// difference is clear.
 
 #include <algorithm>
 #include <atomic>
@@ -28,12 +29,13 @@ namespace {
 
 constexpr double promised = 1e-5;
 constexpr std::size_t queries_per_list = 5000;
-constexpr std::size_t queries_per_patch_list = 20;
+constexpr std::size_t queries_per_patch_list = 40;
 const char* const kinds[] = {"tree", "flann", "slab"};
 
 struct Tally {
   std::mutex mutex;
   std::atomic<std::size_t> queries{0};
+  std::atomic<std::size_t> of_several_dofs{0};
   std::size_t wrong[3] = {0, 0, 0};
   double worst[3] = {0.0, 0.0, 0.0};
 };
@@ -43,11 +45,18 @@ std::vector<Manifold> random_list(std::size_t dofs, std::mt19937& random) {
     return std::uniform_int_distribution<int>(low, high)(random);
   };
   const Eigen::Index dimensions = number(2, 24);
+  const int most = dofs == 1 ? 16 : dofs == 2 ? 10 : dofs == 3 ? 6 : 4;
   std::vector<Manifold> list;
-  for (int i = number(2, 5); i > 0; --i) {
+  for (int i = number(2, dofs > 2 ? 3 : 5); i > 0; --i) {
     std::vector<SampleAxis> axes = {
-        synthetic::axis("a", number(4, 16), number(0, 3) != 0, number(0, 1) == 1, random)};
-    if (dofs == 2) axes.push_back(synthetic::axis("b", number(2, 5), false, number(0, 1) == 1, random));
+        synthetic::axis("a", number(4, most), number(0, 3) != 0, number(0, 1) == 1, random)};
+    // Two values make an axis of degree 1: its segments join with a bend.
+    while (axes.size() < dofs) {
+      const bool second = axes.size() == 1;
+      const bool closed = second && number(0, 3) == 0;
+      const int samples = number(second && !closed ? 2 : 3, dofs == 2 ? 5 : 4);
+      axes.push_back(synthetic::axis("b", samples, closed, number(0, 1) == 1, random));
+    }
     list.push_back(synthetic::smooth_manifold(axes, dimensions, 2, random, number(1, 4)));
   }
   if (number(0, 3) == 0) list.push_back(Manifold(list[0]));
@@ -110,6 +119,7 @@ int main(int count, char** arguments) {
   const std::size_t wanted = count > 1 ? std::strtoul(arguments[1], nullptr, 10) : 10'000'000;
   const auto threads = static_cast<unsigned>(count > 2 ? std::strtoul(arguments[2], nullptr, 10) : 0);
   const auto seed = static_cast<unsigned>(count > 3 ? std::strtoul(arguments[3], nullptr, 10) : 0);
+  const double share = count > 4 ? std::strtod(arguments[4], nullptr) : 0.002;
   Tally tally;
   const char* datasets = std::getenv("EIGENPOSE_DATASETS");
   if (datasets != nullptr && *datasets != '\0') {
@@ -129,20 +139,22 @@ int main(int count, char** arguments) {
   } else {
     std::printf("EIGENPOSE_DATASETS is not set: no real views among the queries\n");
   }
-  const std::size_t lists =
-      (wanted - std::min(wanted, tally.queries.load()) + queries_per_list - 1) / queries_per_list;
-  parallel_for(lists, threads, [&](std::size_t i) {
+  const std::size_t left = wanted - std::min(wanted, tally.queries.load());
+  const auto of_patches = static_cast<std::size_t>(share * static_cast<double>(left));
+  const std::size_t patch_lists = (of_patches + queries_per_patch_list - 1) / queries_per_patch_list;
+  const std::size_t lists = (left - of_patches + queries_per_list - 1) / queries_per_list;
+  parallel_for(patch_lists + lists, threads, [&](std::size_t i) {
     std::mt19937 random(1'000'000 * seed + static_cast<unsigned>(1000 + i));
-    const auto curves = random_list(1, random);
-    Comparison on_curves(curves, tally);
-    for (std::size_t k = 0; k < queries_per_list; ++k)
-      on_curves.ask(synthetic::random_query(curves, random).point, random_bound(random));
-    if (i % 500 != 0) return;
-    const auto patches = random_list(2, random);
-    Comparison on_patches(patches, tally);
-    for (std::size_t k = 0; k < queries_per_patch_list; ++k)
-      on_patches.ask(synthetic::random_query(patches, random).point, random_bound(random));
+    const bool patches = i < patch_lists;
+    const std::size_t dofs = !patches ? 1 : i % 20 == 0 ? 4 : i % 5 == 1 ? 3 : 2;
+    const auto list = random_list(dofs, random);
+    Comparison comparison(list, tally);
+    const std::size_t queries = patches ? queries_per_patch_list : queries_per_list;
+    for (std::size_t k = 0; k < queries; ++k)
+      comparison.ask(synthetic::random_query(list, random).point, random_bound(random));
+    if (patches) tally.of_several_dofs += queries;
   });
+  std::printf("%zu of the queries about manifolds of several DOFs\n", tally.of_several_dofs.load());
   std::size_t wrong = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     std::printf("%-6s %zu queries, %zu different from the oracle, largest difference of distance %.2e\n",
