@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Cholesky>
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 
@@ -124,9 +124,8 @@ ClosestPoint descend(const Manifold& f, const Eigen::VectorXd& point, std::vecto
     while (damping < 1e12) {
       Eigen::MatrixXd damped = hessian;
       damped.diagonal() += damping * (gauss.diagonal().array() + 1e-12 * (1.0 + gauss.trace())).matrix();
-      const Eigen::LLT<Eigen::MatrixXd> factor(damped);
-      if (factor.info() == Eigen::Success) {
-        const Eigen::VectorXd step = -factor.solve(gradient);
+      if (const auto solved = solve_positive_definite(damped, gradient)) {
+        const Eigen::VectorXd step = -*solved;
         std::vector<double> next = q;
         for (std::size_t a = 0; a < m; ++a) {
           const auto i = static_cast<Eigen::Index>(a);

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/QR>
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 
@@ -30,10 +30,7 @@ ManifoldGeometry manifold_geometry(const Manifold& manifold, std::span<const dou
   result.speed = velocity.norm();
   result.tangent = result.speed > 0.0 ? Eigen::VectorXd(velocity / result.speed)
                                       : Eigen::VectorXd(Eigen::VectorXd::Zero(velocity.size()));
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(at.jacobian);
-  qr.setThreshold(singular);
-  const Eigen::Index rank = qr.rank();
-  result.tangents = qr.householderQ() * Eigen::MatrixXd::Identity(at.jacobian.rows(), rank);
+  result.tangents = orthonormal_span(at.jacobian, singular);
 
   Eigen::VectorXd bend = Eigen::VectorXd::Zero(velocity.size());
   Eigen::VectorXd second;

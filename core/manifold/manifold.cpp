@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include <Eigen/LU>
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 
@@ -26,7 +26,7 @@ Eigen::MatrixXd solve_axis(const AxisBasis& basis, Eigen::Index samples, Eigen::
       for (Eigen::Index j = 0; j < samples; ++j)
         sides.row(j).segment((o * inner + i) * dims, dims) =
             columns.col((o * samples + j) * inner + i).transpose();
-  const Eigen::MatrixXd solved = basis.interpolation_matrix().partialPivLu().solve(sides);
+  const Eigen::MatrixXd solved = solve_square(basis.interpolation_matrix(), sides);
   Eigen::MatrixXd result(dims, outer * count * inner);
   for (Eigen::Index o = 0; o < outer; ++o)
     for (Eigen::Index i = 0; i < inner; ++i)

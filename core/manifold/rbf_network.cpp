@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Cholesky>
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 
@@ -53,9 +53,8 @@ Solution solve(const Eigen::MatrixXd& squared, const std::vector<Unit>& units, c
   Eigen::MatrixXd normal = design.transpose() * design;
   normal.diagonal() *= 1.0 + ridge;
   Solution result;
-  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
-  result.weights = factor.solve(design.transpose() * targets.transpose()).transpose();
-  const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+  const auto [solution, inverse] = solve_symmetric(normal, design.transpose() * targets.transpose());
+  result.weights = solution.transpose();
   for (Eigen::Index i = 1; i < normal.rows(); ++i)
     result.cost.push_back(result.weights.col(i).squaredNorm() / std::max(inverse(i, i), 1e-300));
   result.largest_error = (design * result.weights.transpose() - targets.transpose()).cwiseAbs().maxCoeff();

@@ -5,8 +5,9 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Eigenvalues>
 #include <opencv2/imgproc.hpp>
+
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 namespace {
@@ -39,18 +40,18 @@ struct Sampler {
 void span_of(const Eigen::MatrixXf& pictures, int side, PoseScale& scale, Eigen::MatrixXd& points) {
   const Eigen::VectorXf mean = pictures.rowwise().mean();
   const Eigen::MatrixXd centred = (pictures.colwise() - mean).cast<double>();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(centred.transpose() * centred);
+  const SymmetricEigen found = symmetric_eigen(centred.transpose() * centred);
   const Eigen::Index views = pictures.cols();
-  const double largest = std::max(solver.eigenvalues()(views - 1), 1e-12);
+  const double largest = std::max(found.values(0), 1e-12);
   Eigen::Index kept = 0;
-  while (kept < views - 1 && solver.eigenvalues()(views - 1 - kept) > 1e-6 * largest) {
+  while (kept < views - 1 && found.values(kept) > 1e-6 * largest) {
     ++kept;
   }
   kept = std::max<Eigen::Index>(kept, 1);
   scale.side = side;
   scale.basis.resize(pictures.rows(), kept);
   for (Eigen::Index k = 0; k < kept; ++k) {
-    const Eigen::VectorXd vector = centred * solver.eigenvectors().col(views - 1 - k);
+    const Eigen::VectorXd vector = centred * found.vectors.col(k);
     scale.basis.col(k) = (vector / std::max(vector.norm(), 1e-12)).cast<float>();
   }
   scale.mean = scale.basis.transpose() * mean;

@@ -5,8 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Eigenvalues>
-
+#include "core/base/linear_algebra.h"
 #include "core/parts/dense_kernels.h"
 
 namespace eigenpose {
@@ -112,10 +111,10 @@ WindowSpace WindowSpace::learn(const std::vector<CellMap>& maps, std::size_t lim
   }
   mean /= static_cast<double>(count);
   scatter.selfadjointView<Eigen::Lower>().rankUpdate(mean, -static_cast<double>(count));
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scatter.selfadjointView<Eigen::Lower>());
+  const SymmetricEigen found = symmetric_eigen(scatter);
   Eigen::MatrixXf basis(length, WindowGrid::components);
   for (int k = 0; k < WindowGrid::components; ++k) {
-    Eigen::VectorXd vector = solver.eigenvectors().col(length - 1 - k);
+    Eigen::VectorXd vector = found.vectors.col(k);
     Eigen::Index largest = 0;
     vector.cwiseAbs().maxCoeff(&largest);
     basis.col(k) = (vector(largest) < 0.0 ? -vector : vector).cast<float>();

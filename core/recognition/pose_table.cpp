@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 namespace {
@@ -30,18 +30,18 @@ std::vector<double> sample_positions(const SampleAxis& axis, int per_step) {
 /// sqrt(diag((JᵀJ)⁻¹)), infinite for DOFs without effect.
 void sensitivity_of(const Eigen::MatrixXd& jacobian, double* out) {
   const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(information);
+  const auto covariance = inverse_of(information);
   const auto m = static_cast<std::size_t>(information.rows());
-  if (!lu.isInvertible()) {
+  if (!covariance) {
     for (std::size_t d = 0; d < m; ++d) {
       const double own = information(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(d));
       out[d] = own > 0.0 ? 1.0 / std::sqrt(own) : std::numeric_limits<double>::infinity();
     }
     return;
   }
-  const Eigen::MatrixXd covariance = lu.inverse();
   for (std::size_t d = 0; d < m; ++d)
-    out[d] = std::sqrt(std::max(0.0, covariance(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(d))));
+    out[d] =
+        std::sqrt(std::max(0.0, (*covariance)(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(d))));
 }
 
 }  // namespace

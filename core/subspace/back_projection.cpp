@@ -4,8 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
+#include "core/base/linear_algebra.h"
 #include "core/subspace/tile_products.h"
 #include "core/subspace/view_reader.h"
 #include "core/subspace/work_meter.h"
@@ -52,11 +51,7 @@ Eigenspace eigenspace_from_gram(const AppearanceSource& source, const Eigen::Vec
 
 Eigenspace finished_eigenspace(const Eigen::VectorXd& mean, Eigen::MatrixXd basis,
                                const Eigen::VectorXd& values, double total_scatter) {
-  // Cholesky of the small product is Gram-Schmidt in the order of the columns; they are almost orthonormal
-  // already.
-  const Eigen::MatrixXd overlap = basis.transpose() * basis;
-  const Eigen::LLT<Eigen::MatrixXd> factor(overlap);
-  factor.matrixU().solveInPlace<Eigen::OnTheRight>(basis);
+  orthonormalize_columns(basis);
   for (Eigen::Index k = 0; k < basis.cols(); ++k) {
     // Where several entries are as large up to rounding, the first of them decides on every machine.
     const double large = basis.col(k).cwiseAbs().maxCoeff() * (1.0 - kSignTolerance);

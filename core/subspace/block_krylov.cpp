@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include <Eigen/Eigenvalues>
+#include <utility>
 
 #include "core/base/error.h"
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 namespace {
@@ -71,9 +71,9 @@ class KrylovBasis {
 
   /// Ritz values (descending) and coefficients of the Ritz vectors.
   void ritz(VectorXd& values, MatrixXd& coefficients) const {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(projected_.topLeftCorner(used_, used_));
-    values = solver.eigenvalues().reverse();
-    coefficients = solver.eigenvectors().rowwise().reverse();
+    SymmetricEigen found = symmetric_eigen(projected_.topLeftCorner(used_, used_));
+    values = std::move(found.values);
+    coefficients = std::move(found.vectors);
   }
   [[nodiscard]] MatrixXd vectors(const MatrixXd& coefficients) const {
     return basis_.leftCols(used_) * coefficients;

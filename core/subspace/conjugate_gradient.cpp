@@ -4,9 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include <Eigen/Eigenvalues>
-
 #include "core/base/error.h"
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 namespace {
@@ -121,9 +120,7 @@ EigenPairs conjugate_gradient_eigenpairs(Index size, const SymmetricProduct& pro
   while (search.found() < count && search.next(stop) > options.noise) {
   }
   const MatrixXd projected = search.vectors().transpose() * search.images();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(0.5 * (projected + projected.transpose()));
-  const VectorXd values = solver.eigenvalues().reverse();
-  const MatrixXd coefficients = solver.eigenvectors().rowwise().reverse();
+  const auto [values, coefficients] = symmetric_eigen(0.5 * (projected + projected.transpose()));
   const MatrixXd vectors = search.vectors() * coefficients;
   const VectorXd residuals =
       (search.images() * coefficients - vectors * values.asDiagonal()).colwise().norm().transpose();

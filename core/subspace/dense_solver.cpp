@@ -3,9 +3,8 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Eigenvalues>
-
 #include "core/base/clock.h"
+#include "core/base/linear_algebra.h"
 #include "core/subspace/back_projection.h"
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solvers.h"
@@ -38,13 +37,12 @@ Eigen::MatrixXd centred_appearances(const AppearanceSource& source, Eigen::Vecto
 }  // namespace
 
 EigenPairs full_eigenpairs(const Eigen::MatrixXd& matrix, Eigen::Index wanted, double noise) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
-  const Eigen::VectorXd values = solver.eigenvalues().reverse();
+  const auto [values, vectors] = symmetric_eigen(matrix);
   Eigen::Index rank = 0;
   while (rank < std::min(wanted, values.size()) && values[rank] > noise) ++rank;
   EigenPairs pairs;
   pairs.values = values.head(rank);
-  pairs.vectors = solver.eigenvectors().rowwise().reverse().leftCols(rank);
+  pairs.vectors = vectors.leftCols(rank);
   pairs.residuals = (matrix * pairs.vectors - pairs.vectors * pairs.values.asDiagonal()).colwise().norm();
   pairs.next_value = rank < values.size() ? std::max(values[rank], 0.0) : 0.0;
   return pairs;

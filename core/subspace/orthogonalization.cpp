@@ -4,10 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
-
+#include "core/base/linear_algebra.h"
 #include "core/subspace/back_projection.h"
 
 namespace eigenpose {
@@ -17,26 +14,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-struct Span {
-  MatrixXd basis;
-  VectorXd singular_values;
-};
-
-/// Left singular vectors of tall columns with σ ≥ tau. QR first: the SVD is then of a small triangle, and
-/// small singular values keep their digits, which the product of the columns would lose.
-Span span_of(const MatrixXd& columns, double tau) {
+/// Left singular vectors of the columns with σ ≥ tau.
+LeftSingular span_of(const MatrixXd& columns, double tau) {
   if (!(tau > 0.0 && tau < 1.0)) {
     throw std::invalid_argument("tau = " + std::to_string(tau) + ": it is a singular value in (0, 1)");
   }
-  const Index thin = std::min(columns.rows(), columns.cols());
-  const Eigen::HouseholderQR<MatrixXd> qr(columns);
-  const MatrixXd triangle = qr.matrixQR().topRows(thin).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<MatrixXd> svd(triangle, Eigen::ComputeThinU);
-  Index kept = 0;
-  while (kept < thin && svd.singularValues()[kept] >= tau) ++kept;
-  MatrixXd padded = MatrixXd::Zero(columns.rows(), kept);
-  padded.topRows(thin) = svd.matrixU().leftCols(kept);
-  return {qr.householderQ() * padded, svd.singularValues()};
+  return left_singular(columns, tau);
 }
 
 void check_rows(Index found, Index expected) {
@@ -61,8 +44,8 @@ OrthogonalizedBasis orthogonalize(std::span<const Eigen::MatrixXf> bases, double
     columns.middleCols(at, basis.cols()) = basis.cast<double>();
     at += basis.cols();
   }
-  const Span span = span_of(columns, tau);
-  return {span.basis.cast<float>(), span.singular_values};
+  const LeftSingular span = span_of(columns, tau);
+  return {span.vectors.cast<float>(), span.values};
 }
 
 Eigenspace orthogonalize(std::span<const Eigenspace> spaces, double tau) {
@@ -86,7 +69,7 @@ Eigenspace orthogonalize(std::span<const Eigenspace> spaces, double tau) {
     // Means that are equal up to float rounding have no direction.
     if (difference.norm() > 1e-6) columns.col(at++) = difference.normalized();
   }
-  const MatrixXd basis = span_of(columns.leftCols(at), tau).basis;
+  const MatrixXd basis = span_of(columns.leftCols(at), tau).vectors;
   MatrixXd scatter = MatrixXd::Zero(basis.cols(), basis.cols());
   double total_scatter = 0.0;
   for (const Eigenspace& space : spaces) {
@@ -94,9 +77,8 @@ Eigenspace orthogonalize(std::span<const Eigenspace> spaces, double tau) {
     scatter += inside * space.eigenvalues.asDiagonal() * inside.transpose();
     total_scatter += space.total_scatter;
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scatter);
-  const VectorXd values = solver.eigenvalues().reverse().cwiseMax(0.0);
-  return finished_eigenspace(mean, basis * solver.eigenvectors().rowwise().reverse(), values, total_scatter);
+  const SymmetricEigen inner = symmetric_eigen(scatter);
+  return finished_eigenspace(mean, basis * inner.vectors, inner.values.cwiseMax(0.0), total_scatter);
 }
 
 }  // namespace eigenpose
