@@ -1,26 +1,21 @@
 #include "daemon/client/api_client.h"
 
-// Boost 1.74's Asio needs std::exchange before it.
 #include <array>
+#include <chrono>
 #include <utility>
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/local/stream_protocol.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/beast/core.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/base/clock.h"
+#include "daemon/client/local_stream.h"
 
 namespace eigenpose {
 namespace {
 
-namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = boost::beast::http;
-using Protocol = asio::local::stream_protocol;
-using Stream = beast::basic_stream<Protocol>;
 using beast::error_code;
 using nlohmann::json;
 
@@ -31,18 +26,7 @@ constexpr std::uint64_t largest_answer = 256U << 20U;
 class Connection {
  public:
   Connection(const std::filesystem::path& socket, std::chrono::milliseconds timeout)
-      : socket_(socket), timeout_(timeout), stream_(io_) {
-    // The kernel takes or refuses a local connection at once.
-    error_code error;
-    stream_.socket().connect(Protocol::endpoint(socket.string()), error);
-    if (error == asio::error::access_denied)
-      throw FileError(
-          socket,
-          "you may not use this socket: join the group that owns it, or use results.sock for reading");
-    if (error)
-      throw FileError(socket, "no eigenposed answers there (" + error.message() +
-                                  "): start it, or name its socket with --socket");
-  }
+      : socket_(socket), timeout_(timeout), stream_(socket) {}
 
   void send(std::string_view method, std::string_view target, const std::string& body) {
     http::request<http::string_body> request(http::string_to_verb({method.data(), method.size()}),
@@ -54,56 +38,50 @@ class Connection {
       request.body() = body;
     }
     request.prepare_payload();
-    error_code result;
-    start();
-    http::async_write(stream_, request, [&](const error_code& error, std::size_t) { result = error; });
-    run();
+    error_code error;
+    stream_.expires_after(timeout_);
+    http::write(stream_, request, error);
     // A server that has had enough may answer before it has read all.
-    if (result && result != asio::error::broken_pipe && result != asio::error::connection_reset) fail(result);
+    if (error && error != boost::system::errc::broken_pipe && error != boost::system::errc::connection_reset)
+      fail(error);
   }
 
   template <typename Parser>
   void read_header(Parser& parser) {
-    step(parser, [&](auto handler) { http::async_read_header(stream_, buffer_, parser, handler); });
+    error_code error;
+    stream_.expires_after(timeout_);
+    http::read_header(stream_, buffer_, parser, error);
+    check_answer(error);
   }
 
   template <typename Parser>
   void read_rest(Parser& parser) {
-    step(parser, [&](auto handler) { http::async_read(stream_, buffer_, parser, handler); });
+    error_code error;
+    stream_.expires_after(timeout_);
+    http::read(stream_, buffer_, parser, error);
+    check_answer(error);
   }
 
   /// Reads what there is of a body without end. @return false when the service has ended it or `stop` was
   /// requested.
   template <typename Parser>
   bool read_some(Parser& parser, const std::stop_token& stop) {
-    error_code result;
+    error_code error;
     stream_.expires_never();
-    http::async_read_some(stream_, buffer_, parser,
-                          [&](const error_code& error, std::size_t) { result = error; });
-    const std::stop_callback interrupt(stop, [this] { asio::post(io_, [this] { stream_.cancel(); }); });
-    run();
-    return !result || result == http::error::need_buffer;
+    const std::stop_callback interrupt(stop, [this] { stream_.cancel(); });
+    http::read_some(stream_, buffer_, parser, error);
+    return !error || error == http::error::need_buffer;
   }
 
  private:
-  void start() { stream_.expires_after(timeout_); }
-  void run() {
-    io_.restart();
-    io_.run();
-  }
-
-  template <typename Parser, typename Start>
-  void step(Parser&, Start begin) {
-    error_code result;
-    start();
-    begin([&](const error_code& error, std::size_t) { result = error; });
-    run();
-    if (result && result != http::error::end_of_stream) fail(result);
-    if (result) throw Error(socket_.string() + ": eigenposed closed the connection without an answer");
+  void check_answer(const error_code& error) const {
+    if (error == http::error::end_of_stream)
+      throw Error(socket_.string() + ": eigenposed closed the connection without an answer");
+    if (error) fail(error);
   }
 
   [[noreturn]] void fail(const error_code& error) const {
-    if (error == beast::error::timeout)
+    if (error == boost::system::errc::timed_out)
       throw Error(socket_.string() + ": no answer within " + std::to_string(timeout_.count()) +
                   " ms: the log of eigenposed may say why");
     throw Error(socket_.string() + ": the connection broke: " + error.message());
@@ -111,8 +89,7 @@ class Connection {
 
   const std::filesystem::path& socket_;
   std::chrono::milliseconds timeout_;
-  asio::io_context io_{1};
-  Stream stream_;
+  LocalStream stream_;
   beast::flat_buffer buffer_;
 };
 
