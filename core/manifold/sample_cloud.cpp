@@ -7,7 +7,7 @@ namespace eigenpose {
 namespace {
 
 /// Samples per patch and axis, by the number of axes that are not constant.
-constexpr std::array<int, max_manifold_dofs + 1> samples_per_axis = {1, 10, 4, 3, 2};
+constexpr std::array<int, max_manifold_dofs + 1> cloud_samples = {1, 10, 4, 3, 2};
 
 /// Rows of Bernstein blossoms: the Bézier points of the piece [a, b] of a curve of degree p, from those of
 /// the whole.
@@ -50,7 +50,7 @@ SampleCloud::SampleCloud(const PatchSet& patches) : dimensions_(patches.dimensio
   for (std::size_t patch = 0; patch < patches.size(); ++patch) {
     const bernstein::Shape& shape = patches.shape(patch);
     const Eigen::MatrixXd whole = patches.bezier(patch);
-    const int per_axis = samples_per_axis[static_cast<std::size_t>(shape.axes)];
+    const int per_axis = cloud_samples[static_cast<std::size_t>(shape.axes)];
     int cells = 1;
     for (int a = 0; a < shape.axes; ++a) cells *= per_axis;
     for (int cell = 0; cell < cells; ++cell) {

@@ -1,6 +1,7 @@
 #include "core/model/hdf5_file.h"
 
 #include <array>
+#include <cstdio>
 #include <utility>
 
 namespace eigenpose {
@@ -61,6 +62,12 @@ Matrix read_dataset(hid_t group, const std::string& name, hid_t memory_type) {
 }
 
 }  // namespace
+
+std::string numbered(std::size_t i) {
+  std::array<char, 24> text{};
+  std::snprintf(text.data(), text.size(), "%06zu", i);
+  return text.data();
+}
 
 Hdf5Lock::Hdf5Lock() : lock_(library_mutex()) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);

@@ -22,6 +22,9 @@ class Hdf5Failure : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A name whose alphabetical order is the order of the numbers: "000007".
+std::string numbered(std::size_t i);
+
 /// Exclusive use of the library, with its own error printing off.
 class Hdf5Lock {
  public:

@@ -95,12 +95,6 @@ NormalizationOptions read_normalization(const Hdf5Group& group) {
   return options;
 }
 
-std::string numbered(std::size_t i) {
-  std::array<char, 24> text{};
-  std::snprintf(text.data(), text.size(), "%06zu", i);
-  return text.data();
-}
-
 void write_eigenspace(const Hdf5Group& group, const Eigenspace& eigenspace) {
   group.write("mean", Eigen::MatrixXf(eigenspace.mean));
   group.write("basis", eigenspace.basis);

@@ -1,16 +1,7 @@
 #include "core/model/parts_file.h"
 
-#include <array>
-#include <cstdio>
-
 namespace eigenpose {
 namespace {
-
-std::string numbered(std::size_t i) {
-  std::array<char, 24> text{};
-  std::snprintf(text.data(), text.size(), "%06zu", i);
-  return text.data();
-}
 
 void write_scale(const Hdf5Group& group, const PoseScale& scale, const Manifold& manifold) {
   group.write("side", std::int64_t{scale.side});

@@ -17,8 +17,6 @@ constexpr double clear_lead = 0.6;
 constexpr double most_covered = 0.5;
 /// Poses this much less likely than the best (natural logarithm) are not worth telling: a factor of 20.
 constexpr double likely_pose = 3.0;
-/// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
-constexpr double poses_apart = 1.0 / 12.0;
 /// The curvature of the cost promises more than left-out views keep: 68 % lie within this many times its
 /// sigma.
 constexpr double sigma_inflation = 1.8;

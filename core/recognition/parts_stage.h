@@ -15,6 +15,9 @@
 
 namespace eigenpose {
 
+/// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
+inline constexpr double poses_apart = 1.0 / 12.0;
+
 /// Judges regions by windows and alignment. Holds scratch memory: one thread at a time.
 class PartsStage {
  public:

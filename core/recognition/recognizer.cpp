@@ -28,8 +28,6 @@ constexpr double search_reach = 1.5;
 constexpr double effective_dimensions = 6.0;
 /// Below this probability of the best against the second best, the outcome is ambiguous.
 constexpr double sure_enough = 0.7;
-/// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
-constexpr double poses_apart = 1.0 / 12.0;
 /// Where the second best object is nearer than this times the best, the objects' own spaces decide.
 constexpr double second_look_ratio = 2.0;
 /// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.

@@ -12,13 +12,13 @@
 namespace eigenpose::cli {
 namespace {
 
-struct Options {
+struct AcquireOptions {
   ServiceOptions service;
   std::string object;
   std::string plan = "default";
 };
 
-int run(const Options& options, const std::stop_token& stop) {
+int run_acquire(const AcquireOptions& options, const std::stop_token& stop) {
   const nlohmann::json job = run_job(options.service, "/v1/acquisitions",
                                      {{"object", options.object}, {"plan", options.plan}}, stop);
   if (options.service.json) {
@@ -34,7 +34,7 @@ int run(const Options& options, const std::stop_token& stop) {
 }  // namespace
 
 void add_acquire_command(CLI::App& app, CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<AcquireOptions>();
   CLI::App* command =
       app.add_subcommand("acquire", "Have the service take all views of the object on the table");
   command->add_option("OBJECT", options->object, "Its name: letters, digits, _ . -")->required();
@@ -46,7 +46,7 @@ void add_acquire_command(CLI::App& app, CommandLine& line) {
       "command "
       "continues there.\n\nExample: eigenpose acquire mug --plan lights");
   command->callback(
-      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+      [options, &line] { line.action = [options, &line] { return run_acquire(*options, line.stop); }; });
 }
 
 }  // namespace eigenpose::cli

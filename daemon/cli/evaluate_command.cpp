@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* examples = R"(
+constexpr const char* evaluate_examples = R"(
 Learns every k-th view of each object and recognises all others. Nothing of a test view influences learning or
 thresholds. A view counts as recognised when the nearest object is the right one; how many of those would have been
 reported as unknown or ambiguous is told beside it. Pose errors are over recognised views.
@@ -33,7 +33,7 @@ Examples:
   eigenpose evaluate sets/coil-20 --perturb shift=2,scale=0.03,rotation=3 --seed 7
   eigenpose evaluate sets/coil-20 --occlude 0.2 --leave-one-out)";
 
-struct Options {
+struct EvaluateOptions {
   std::string sets;
   std::size_t learn_every = 2;
   std::size_t offset = 0;
@@ -155,7 +155,7 @@ void print(const EvaluationReport& report) {
 
 /// "shift=2,scale=0.03,rotation=3" and --occlude. @throws ConfigError for another name or a value out of
 /// range.
-TestDamage parse_damage(const Options& options) {
+TestDamage parse_damage(const EvaluateOptions& options) {
   TestDamage damage;
   damage.seed = options.seed;
   damage.occlusion = options.occlude;
@@ -177,7 +177,7 @@ TestDamage parse_damage(const Options& options) {
   return damage;
 }
 
-int run(const Options& options, const std::stop_token& stop) {
+int run_evaluate(const EvaluateOptions& options, const std::stop_token& stop) {
   const auto sets = open_chosen_sets(options.sets, options.learning);
   EvaluationOptions evaluation;
   evaluation.learn_every = options.learn_every;
@@ -201,10 +201,10 @@ int run(const Options& options, const std::stop_token& stop) {
 }  // namespace
 
 void add_evaluate_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateOptions>();
   CLI::App* command =
       app.add_subcommand("evaluate", "Measure recognition and pose on views that were not learned");
-  command->footer(examples);
+  command->footer(evaluate_examples);
   command->add_option("sets", options->sets, "Folder of image sets")->required();
   command->add_option("--learn-every", options->learn_every, "Learn every k-th view, test on the others")
       ->check(CLI::Range(2, 10000))
@@ -229,7 +229,7 @@ void add_evaluate_command(CLI::App& app, CommandLine& line) {
       ->capture_default_str();
   command->add_flag("--json", options->as_json, "Print the result as JSON");
   command->callback(
-      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+      [options, &line] { line.action = [options, &line] { return run_evaluate(*options, line.stop); }; });
 }
 
 }  // namespace eigenpose::cli

@@ -15,7 +15,7 @@
 namespace eigenpose::cli {
 namespace {
 
-constexpr const char* examples = R"(
+constexpr const char* import_examples = R"(
 The pictures are named OBJECT__NUMBER.png. Each object becomes an image set SETS/OBJECT.
   --angle index:5    the number counts pictures, 5 degrees apart (COIL-20)
   --angle degrees    the number is the angle (COIL-100)
@@ -27,7 +27,7 @@ Examples:
 Views that show the object from edge to edge are taken whole later on, others are segmented. Which it is, is measured
 over the whole folder and kept in each set.json; --views overrules it.)";
 
-struct Options {
+struct ImportOptions {
   std::string naming;
   std::string folder;
   std::string to;
@@ -49,7 +49,7 @@ CoilAngle parse_angle(const std::string& text) {
   throw ConfigError("--angle " + text + ": give index:5 (the number counts steps of 5 degrees) or degrees");
 }
 
-int run(const Options& options, const std::stop_token& stop) {
+int run_import(const ImportOptions& options, const std::stop_token& stop) {
   CoilImportOptions import;
   import.angle = parse_angle(options.angle);
   if (options.views == "cropped") import.views = ViewKind::cropped;
@@ -69,9 +69,9 @@ int run(const Options& options, const std::stop_token& stop) {
 }  // namespace
 
 void add_import_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportOptions>();
   CLI::App* command = app.add_subcommand("import", "Turn photographs into image sets");
-  command->footer(examples);
+  command->footer(import_examples);
   command->add_option("naming", options->naming, "How the pictures are named: coil")
       ->required()
       ->check(CLI::IsMember({"coil"}));
@@ -83,7 +83,7 @@ void add_import_command(CLI::App& app, CommandLine& line) {
       ->check(CLI::IsMember({"auto", "cropped", "scene"}))
       ->capture_default_str();
   command->callback(
-      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+      [options, &line] { line.action = [options, &line] { return run_import(*options, line.stop); }; });
 }
 
 }  // namespace eigenpose::cli

@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* examples = R"(
+constexpr const char* inspect_examples = R"(
 The file is checked as a whole first; a damaged one is refused. It is HDF5: Python, MATLAB and h5dump open it too.
 
 Examples:
@@ -24,7 +24,7 @@ Examples:
   eigenpose inspect lab.model --geometry
   eigenpose inspect lab.model --json)";
 
-struct Options {
+struct InspectOptions {
   std::string model;
   bool geometry = false;
   bool as_json = false;
@@ -93,7 +93,7 @@ void print(const Model& model) {
   }
 }
 
-int run(const Options& options) {
+int run_inspect(const InspectOptions& options) {
   const Model model = load_model(options.model);
   if (options.as_json) {
     json all = to_json(model);
@@ -111,14 +111,14 @@ int run(const Options& options) {
 }  // namespace
 
 void add_inspect_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InspectOptions>();
   CLI::App* command = app.add_subcommand("inspect", "Show what a model file holds");
-  command->footer(examples);
+  command->footer(inspect_examples);
   command->add_option("model", options->model, "The model file")->required();
   command->add_flag("--geometry", options->geometry,
                     "Tangent, normal and curvature of the manifolds (all vectors with --json)");
   command->add_flag("--json", options->as_json, "Print it as JSON");
-  command->callback([options, &line] { line.action = [options] { return run(*options); }; });
+  command->callback([options, &line] { line.action = [options] { return run_inspect(*options); }; });
 }
 
 }  // namespace eigenpose::cli

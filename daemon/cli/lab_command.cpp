@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* examples = R"(
+constexpr const char* lab_examples = R"(
 What stands on the table is known to the lab alone: the service has to see it.
 
 Examples:
@@ -28,7 +28,7 @@ Examples:
   eigenpose lab fault camera --stalled     break something; without options it is well again
   eigenpose lab fault wire silence -n 3    the next three Modbus requests get no answer)";
 
-struct Options {
+struct LabOptions {
   ServiceOptions service;
   std::string object;
   double yaw_deg = 0.0;
@@ -49,7 +49,7 @@ struct Options {
   int delay_ms = 300;
 };
 
-sim::LabClient connected(const Options& options) {
+sim::LabClient connected(const LabOptions& options) {
   // The lab's socket stands beside the service's two.
   const std::filesystem::path named = options.service.socket;
   if (named.filename() == "results.sock" || named.filename() == "control.sock") {
@@ -58,7 +58,7 @@ sim::LabClient connected(const Options& options) {
   return sim::LabClient(named.extension() == ".sock" ? named : named / "lab.sock");
 }
 
-int list(const Options& options) {
+int list(const LabOptions& options) {
   sim::LabClient lab = connected(options);
   if (options.service.json) {
     std::printf("%s\n", lab.request(R"({"do": "objects"})").c_str());
@@ -72,7 +72,7 @@ int list(const Options& options) {
   return exit_done;
 }
 
-int truth(const Options& options) {
+int truth(const LabOptions& options) {
   sim::LabClient lab = connected(options);
   if (options.service.json) {
     std::printf("%s\n", lab.request(R"({"do": "truth"})").c_str());
@@ -93,7 +93,7 @@ int truth(const Options& options) {
   return exit_done;
 }
 
-int place(const Options& options) {
+int place(const LabOptions& options) {
   const auto id = connected(options).place(options.object, degrees(options.yaw_deg), options.x_mm,
                                            options.y_mm, options.by_hand);
   std::printf(options.service.json ? "{\"id\":%llu}\n" : "placed as %llu\n",
@@ -101,7 +101,7 @@ int place(const Options& options) {
   return exit_done;
 }
 
-int fault_drive(const Options& options) {
+int fault_drive(const LabOptions& options) {
   connected(options).request(json{
       {"do", "drive_faults"},
       {"unit", options.unit},
@@ -113,7 +113,7 @@ int fault_drive(const Options& options) {
   return exit_done;
 }
 
-int fault_wire(const Options& options) {
+int fault_wire(const LabOptions& options) {
   connected(options).request(json{
       {"do", "wire_fault"},
       {"kind", options.wire_fault},
@@ -125,19 +125,19 @@ int fault_wire(const Options& options) {
 
 /// Adds a subcommand whose action is `run(options)`.
 template <class Run>
-CLI::App* add(CLI::App& parent, const char* name, const char* what, const std::shared_ptr<Options>& options,
-              CommandLine& line, Run run) {
+CLI::App* add(CLI::App& parent, const char* name, const char* what,
+              const std::shared_ptr<LabOptions>& options, CommandLine& line, Run run) {
   CLI::App* command = parent.add_subcommand(name, what);
   add_service_options(*command, options->service);
   command->callback([options, &line, run] { line.action = [options, run] { return run(*options); }; });
   return command;
 }
 
-void add_faults(CLI::App& lab, const std::shared_ptr<Options>& options, CommandLine& line) {
+void add_faults(CLI::App& lab, const std::shared_ptr<LabOptions>& options, CommandLine& line) {
   CLI::App* fault = lab.add_subcommand("fault", "Break something, or make it well again");
   fault->require_subcommand(1);
   CLI::App* camera = add(*fault, "camera", "Faults of the camera; those not named are ended", options, line,
-                         [](const Options& chosen) {
+                         [](const LabOptions& chosen) {
                            connected(chosen).set_camera_faults(chosen.camera);
                            return int{exit_done};
                          });
@@ -168,9 +168,9 @@ void add_faults(CLI::App& lab, const std::shared_ptr<Options>& options, CommandL
 }  // namespace
 
 void add_lab_command(CLI::App& app, CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<LabOptions>();
   CLI::App* lab = app.add_subcommand("lab", "The simulated lab: place objects, know the truth, break things");
-  lab->footer(examples);
+  lab->footer(lab_examples);
   lab->require_subcommand(1);
 
   add(*lab, "list", "What can be placed", options, line, list);
@@ -182,23 +182,24 @@ void add_lab_command(CLI::App& app, CommandLine& line) {
   placing->add_option("--x", options->x_mm, "from the table's axis to the right, mm");
   placing->add_option("--y", options->y_mm, "from the table's axis away from the camera, mm");
   placing->add_flag("--hand", options->by_hand, "a hand brings it");
-  CLI::App* removing = add(*lab, "remove", "Take one object away", options, line, [](const Options& chosen) {
-    connected(chosen).remove(chosen.id, chosen.by_hand);
-    return int{exit_done};
-  });
+  CLI::App* removing =
+      add(*lab, "remove", "Take one object away", options, line, [](const LabOptions& chosen) {
+        connected(chosen).remove(chosen.id, chosen.by_hand);
+        return int{exit_done};
+      });
   removing->add_option("id", options->id, "as 'place' and 'truth' say it")->required();
   removing->add_flag("--hand", options->by_hand, "a hand takes it");
-  add(*lab, "clear", "Empty the table", options, line, [](const Options& chosen) {
+  add(*lab, "clear", "Empty the table", options, line, [](const LabOptions& chosen) {
     connected(chosen).clear();
     return int{exit_done};
   });
   CLI::App* hand = add(*lab, "hand", "Hold a hand into the picture, or take it out", options, line,
-                       [](const Options& chosen) {
+                       [](const LabOptions& chosen) {
                          connected(chosen).hand(chosen.hand == "in");
                          return int{exit_done};
                        });
   hand->add_option("where", options->hand, "in or out")->required()->check(CLI::IsMember({"in", "out"}));
-  CLI::App* lamp = add(*lab, "lamp", "Set the lamp's level", options, line, [](const Options& chosen) {
+  CLI::App* lamp = add(*lab, "lamp", "Set the lamp's level", options, line, [](const LabOptions& chosen) {
     connected(chosen).set_lamp_level(chosen.level);
     return int{exit_done};
   });

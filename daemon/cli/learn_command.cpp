@@ -20,7 +20,7 @@
 namespace eigenpose::cli {
 namespace {
 
-constexpr const char* examples = R"(
+constexpr const char* learn_examples = R"(
 Examples:
   eigenpose learn sets/coil-20 --to coil-20.model --size 128
   eigenpose learn sets/lab --to lab.model --energy 0.95 --components 60
@@ -31,7 +31,7 @@ Examples:
 
 The model is written at once when all is learned; a former model of that name stays until then.)";
 
-struct Options {
+struct LearnOptions {
   std::string sets;
   std::string to;
   LearningArguments learning;
@@ -73,7 +73,7 @@ void print(const Model& model, const LearningReport& report, const std::string& 
   std::printf("model: %s\n", file.c_str());
 }
 
-int run(const Options& options, const CLI::App& command, const std::stop_token& stop) {
+int run_learn(const LearnOptions& options, const CLI::App& command, const std::stop_token& stop) {
   if (options.sets.empty()) {
     const int components =
         command.count("--components") > 0 ? static_cast<int>(options.learning.components) : 0;
@@ -96,16 +96,16 @@ int run(const Options& options, const CLI::App& command, const std::stop_token& 
 }  // namespace
 
 void add_learn_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LearnOptions>();
   CLI::App* command = app.add_subcommand("learn", "Learn a model from image sets");
-  command->footer(examples);
+  command->footer(learn_examples);
   command->add_option("sets", options->sets,
                       "Folder of image sets; without it the running service learns what it has acquired");
   command->add_option("--to", options->to, "The model file to write");
   add_learning_options(*command, options->learning);
   add_service_options(*command, options->service);
   command->callback([options, command, &line] {
-    line.action = [options, command, &line] { return run(*options, *command, line.stop); };
+    line.action = [options, command, &line] { return run_learn(*options, *command, line.stop); };
   });
 }
 

@@ -47,7 +47,7 @@ constexpr const char* about =
     "Eigenpose learns objects from views taken all around them, and says which object stands before a camera "
     "and how it is turned.";
 
-constexpr const char* examples = R"(
+constexpr const char* first_steps = R"(
 Start here:
   eigenpose import coil FOLDER --to SETS --angle index:5   turn photographs into image sets
   eigenpose learn SETS --to lab.model                      learn them
@@ -115,7 +115,7 @@ int run(int argc, char** argv) {
 
   CLI::App app(about, "eigenpose");
   app.set_version_flag("--version", std::string("eigenpose ") + EIGENPOSE_VERSION);
-  app.footer(examples);
+  app.footer(first_steps);
   app.require_subcommand(1);
   for (const AddCommand add : commands) add(app, line);
 

@@ -20,7 +20,7 @@
 namespace eigenpose::cli {
 namespace {
 
-constexpr const char* examples = R"(
+constexpr const char* recognize_examples = R"(
 Every object in a picture gets one line: where it is, which object, its pose, and how sure that is. A picture given to a
 model learned from cropped views is taken whole.
 
@@ -28,7 +28,7 @@ Examples:
   eigenpose recognize photo.png --model lab.model
   eigenpose recognize *.png --model lab.model --json)";
 
-struct Options {
+struct RecognizeOptions {
   std::vector<std::string> images;
   std::string model;
   RecognizerOptions recognizer;
@@ -74,7 +74,7 @@ void print(const Outcome& outcome, const Model& model) {
         outcome.verdict == Verdict::ambiguous && outcome.runner_up ? outcome.runner_up->object.c_str() : "");
 }
 
-int run(const Options& options, const std::stop_token& stop) {
+int run_recognize(const RecognizeOptions& options, const std::stop_token& stop) {
   const auto model = std::make_shared<const Model>(load_model(options.model));
   Recognizer recognizer(model, options.recognizer);
   nlohmann::json all = nlohmann::json::array();
@@ -103,16 +103,16 @@ int run(const Options& options, const std::stop_token& stop) {
 }  // namespace
 
 void add_recognize_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecognizeOptions>();
   CLI::App* command =
       app.add_subcommand("recognize", "Say which objects are in pictures, and how they are turned");
-  command->footer(examples);
+  command->footer(recognize_examples);
   command->add_option("images", options->images, "Pictures: PNG, JPEG, PGM, PPM")->required();
   command->add_option("--model", options->model, "The model file")->required();
   add_recognizer_options(*command, options->recognizer);
   command->add_flag("--json", options->as_json, "Print the outcomes as JSON");
   command->callback(
-      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+      [options, &line] { line.action = [options, &line] { return run_recognize(*options, line.stop); }; });
 }
 
 }  // namespace eigenpose::cli

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Options {
+struct ResultsOptions {
   ServiceOptions service;
   bool follow = false;
   int count = 0;  ///< end after so many; 0: never
@@ -49,7 +49,7 @@ void print(const json& result) {
   std::fflush(stdout);
 }
 
-int run(const Options& options, const std::stop_token& stop) {
+int run_results(const ResultsOptions& options, const std::stop_token& stop) {
   const ApiClient client = reading_client(options.service);
   if (!options.follow) {
     const json result = client.get("/v1/results/latest");
@@ -84,7 +84,7 @@ int run(const Options& options, const std::stop_token& stop) {
 }  // namespace
 
 void add_results_command(CLI::App& app, CommandLine& line) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ResultsOptions>();
   CLI::App* command = app.add_subcommand("results", "What the service sees on the table");
   command->add_flag("--follow", options->follow, "Go on: print each new result as it comes");
   command->add_option("--count", options->count, "With --follow: end after so many results")
@@ -92,7 +92,7 @@ void add_results_command(CLI::App& app, CommandLine& line) {
   add_service_options(*command, options->service);
   command->footer("Examples:\n  eigenpose results\n  eigenpose results --follow --json | jq .outcomes");
   command->callback(
-      [options, &line] { line.action = [options, &line] { return run(*options, line.stop); }; });
+      [options, &line] { line.action = [options, &line] { return run_results(*options, line.stop); }; });
 }
 
 }  // namespace eigenpose::cli

@@ -23,7 +23,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr int wake_ms = 5;  // drives tick, late answers leave
+constexpr int line_wake_ms = 5;  // drives tick, late answers leave
 /// A frame that is not whole after this long a silence was damaged; a pseudo-terminal may pause longer
 /// than 3.5 characters.
 constexpr Duration frame_gap = std::chrono::milliseconds(30);
@@ -131,7 +131,7 @@ class SimRtuServer::Worker {
         line = line_.get();
       }
       pollfd polled{line, POLLIN, 0};
-      ::poll(&polled, 1, wake_ms);  // an unplugged line, −1, only sleeps
+      ::poll(&polled, 1, line_wake_ms);  // an unplugged line, −1, only sleeps
       pdus_.tick();
       const std::lock_guard lock(mutex_);
       if (!line_) continue;

@@ -7,7 +7,7 @@
 namespace eigenpose::sim {
 namespace {
 
-constexpr std::size_t header_size = 6;
+constexpr std::size_t apt_header = 6;
 constexpr std::uint8_t address_here = 0x50;
 constexpr std::uint8_t address_host = 0x01;
 constexpr std::uint8_t long_flag = 0x80;
@@ -38,10 +38,10 @@ std::vector<std::uint8_t> AptController::receive(std::span<const std::uint8_t> b
   const std::lock_guard lock(mutex_);
   finish_motion(lab_.clock().now());
   heard_.insert(heard_.end(), bytes.begin(), bytes.end());
-  while (heard_.size() >= header_size) {
+  while (heard_.size() >= apt_header) {
     const bool is_long = (heard_[4] & long_flag) != 0;
-    const std::size_t size = header_size + (is_long ? little_endian(heard_, 2, 2) : 0);
-    if ((heard_[4] & ~long_flag) != address_here || size > header_size + 255) {
+    const std::size_t size = apt_header + (is_long ? little_endian(heard_, 2, 2) : 0);
+    if ((heard_[4] & ~long_flag) != address_here || size > apt_header + 255) {
       heard_.clear();  // not for this unit, or the place in the stream is lost
       break;
     }
@@ -204,7 +204,7 @@ void AptController::finish_motion(TimePoint now) {
 void AptController::obey(std::span<const std::uint8_t> message) {
   const TimePoint now = lab_.clock().now();
   const std::uint32_t number = little_endian(message, 0, 2);
-  const std::size_t data = header_size;
+  const std::size_t data = apt_header;
   switch (number) {
     case 0x0005:
       say_info();

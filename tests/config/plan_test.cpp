@@ -18,7 +18,7 @@ const Dof table{"table", "deg", 0.0, 360.0, true};
 const Dof slide{"slide", "mm", -50.0, 50.0, false};
 const std::vector<Dof> dofs = {table, slide};
 
-std::string refusal(const Plan& plan) {
+std::string plan_refusal(const Plan& plan) {
   try {
     check_plan(plan, dofs);
   } catch (const ConfigError& error) {
@@ -54,13 +54,13 @@ TEST(Plan, AnyNumberOfAxesMakesAWorkspaceInThePlansOrder) {
 }
 
 TEST(Plan, RefusesWhatTheAxesCannotDoAndSaysWhatIsAllowed) {
-  EXPECT_THAT(refusal({"p", {}}), HasSubstr("at least one"));
-  EXPECT_THAT(refusal({"p", {{"tabel", {0}}}}), HasSubstr("allowed: table, slide"));
-  EXPECT_THAT(refusal({"p", {{"table", {0}}, {"table", {0}}}}), HasSubstr("named twice"));
-  EXPECT_THAT(refusal({"p", {{"table", {}}}}), HasSubstr("no positions"));
-  EXPECT_THAT(refusal({"p", {{"slide", {0, 51}}}}), HasSubstr("allowed: -50 to 50"));
-  EXPECT_THAT(refusal({"p", {{"table", {0, 360}}}}), HasSubstr("twice"));
-  EXPECT_EQ(refusal({"p", {{"table", {0, 10}}}}), "accepted");
+  EXPECT_THAT(plan_refusal({"p", {}}), HasSubstr("at least one"));
+  EXPECT_THAT(plan_refusal({"p", {{"tabel", {0}}}}), HasSubstr("allowed: table, slide"));
+  EXPECT_THAT(plan_refusal({"p", {{"table", {0}}, {"table", {0}}}}), HasSubstr("named twice"));
+  EXPECT_THAT(plan_refusal({"p", {{"table", {}}}}), HasSubstr("no positions"));
+  EXPECT_THAT(plan_refusal({"p", {{"slide", {0, 51}}}}), HasSubstr("allowed: -50 to 50"));
+  EXPECT_THAT(plan_refusal({"p", {{"table", {0, 360}}}}), HasSubstr("twice"));
+  EXPECT_EQ(plan_refusal({"p", {{"table", {0, 10}}}}), "accepted");
 }
 
 TEST(Plan, RefusesAGridThatNobodyCanMean) {
@@ -70,7 +70,7 @@ TEST(Plan, RefusesAGridThatNobodyCanMean) {
   const Plan plan{
       "p",
       {{"table", spaced_positions(table, 0, 360, 1000)}, {"slide", spaced_positions(slide, 0, 50, 1000)}}};
-  EXPECT_THAT(refusal(plan), HasSubstr("100000"));
+  EXPECT_THAT(plan_refusal(plan), HasSubstr("100000"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <thread>
 
@@ -50,6 +51,10 @@ struct CameraBenchMaker {
   std::string name;
   std::function<std::unique_ptr<CameraBench>()> make;
 };
+
+inline std::ostream& operator<<(std::ostream& stream, const CameraBenchMaker& maker) {
+  return stream << maker.name;
+}
 
 class CameraConformance : public testing::TestWithParam<CameraBenchMaker> {
  protected:

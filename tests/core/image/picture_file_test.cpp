@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-cv::Mat noise(int rows, int cols, int type) {
+cv::Mat picture_noise(int rows, int cols, int type) {
   cv::Mat image(rows, cols, type);
   cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, type == CV_16UC1 ? 65536 : 256);
   return image;
@@ -29,7 +29,7 @@ std::string refusal(const std::vector<unsigned char>& bytes) {
 
 TEST(PictureFile, GivesBackEveryPixelOfEveryKind) {
   for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1}) {
-    const cv::Mat image = noise(31, 47, type);
+    const cv::Mat image = picture_noise(31, 47, type);
     const cv::Mat back = decode_picture(encode_png(image), "view.png");
     ASSERT_EQ(back.type(), type);
     EXPECT_EQ(cv::norm(image, back, cv::NORM_INF), 0.0);
@@ -37,14 +37,14 @@ TEST(PictureFile, GivesBackEveryPixelOfEveryKind) {
 }
 
 TEST(PictureFile, RefusesAPngCutAnywhere) {
-  const auto bytes = encode_png(noise(40, 40, CV_8UC1));
+  const auto bytes = encode_png(picture_noise(40, 40, CV_8UC1));
   for (std::size_t keep = 1; keep < bytes.size(); keep += 13)
     EXPECT_NE(refusal({bytes.begin(), bytes.begin() + static_cast<long>(keep)}), "accepted") << keep;
   EXPECT_THAT(refusal({bytes.begin(), bytes.end() - 1}), HasSubstr("truncated"));
 }
 
 TEST(PictureFile, RefusesAPngWithOneFlippedByteAnywhere) {
-  const auto bytes = encode_png(noise(40, 40, CV_8UC1));
+  const auto bytes = encode_png(picture_noise(40, 40, CV_8UC1));
   for (std::size_t at = 0; at < bytes.size(); at += 7) {
     auto damaged = bytes;
     damaged[at] ^= 0xff;

@@ -26,8 +26,8 @@ namespace eigenpose {
 namespace {
 
 constexpr std::size_t kViews = 640;
-constexpr std::size_t kLength = 65536;
-constexpr std::size_t kSet = kViews * kLength;  ///< 40 MB
+constexpr std::size_t kLongView = 65536;
+constexpr std::size_t kSet = kViews * kLongView;  ///< 40 MB
 constexpr std::size_t kLimit = kSet / 4;
 constexpr std::size_t kComponents = 4;
 
@@ -51,7 +51,7 @@ class TemporaryFile {
 /// Smooth views of any length, cheap to make: a few waves a view, no noise.
 void write_large_set(const TemporaryFile& file) {
   constexpr std::size_t kPlaces = 97;
-  std::vector<std::uint8_t> view(kLength);
+  std::vector<std::uint8_t> view(kLongView);
   std::vector<double> waves(kPlaces);
   for (std::size_t j = 0; j < kViews; ++j) {
     const double angle = 6.283185 * static_cast<double>(j) / kViews;
@@ -60,7 +60,7 @@ void write_large_set(const TemporaryFile& file) {
       waves[place] = 100.0 + 40.0 * std::cos(angle + 0.05 * x) + 24.0 * std::cos(2 * angle + 0.9 * x);
     }
     std::uint32_t noise = static_cast<std::uint32_t>(j) * 2654435761U + 1U;
-    for (std::size_t k = 0; k < kLength; ++k) {
+    for (std::size_t k = 0; k < kLongView; ++k) {
       noise = noise * 1664525U + 1013904223U;
       view[k] = static_cast<std::uint8_t>(waves[(k >> 6) % kPlaces] + static_cast<double>(noise >> 28));
     }
@@ -74,14 +74,14 @@ TEST(Streaming, LearnsFourTimesTheMemoryLimitUnderThatLimit) {
   const TemporaryFile file;
   write_large_set(file);
   std::vector<std::uint8_t> bytes(kSet);
-  ByteFileSource(file.path(), kLength).read_bytes(0, kViews, bytes.data());
+  ByteFileSource(file.path(), kLongView).read_bytes(0, kViews, bytes.data());
   const Eigenspace unlimited =
-      solve_eigenspace(ByteSource(bytes, kLength), {.solver = "gram", .components = kComponents});
+      solve_eigenspace(ByteSource(bytes, kLongView), {.solver = "gram", .components = kComponents});
   bytes = {};
   for (const std::string solver : {"auto", "gram", "krylov"}) {
     const auto path = file.path().string() + "-" + solver;
     const std::string command = std::string(STREAMING_PROBE) + " '" + file.path().string() + "' " +
-                                std::to_string(kLength) + ' ' + solver + ' ' + std::to_string(kComponents) +
+                                std::to_string(kLongView) + ' ' + solver + ' ' + std::to_string(kComponents) +
                                 ' ' + std::to_string(kLimit) + " '" + path + "'";
     const int status = std::system(command.c_str());
     ASSERT_TRUE(WIFEXITED(status)) << command;
