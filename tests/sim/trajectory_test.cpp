@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 
 constexpr TimePoint begin{std::chrono::seconds(100)};
 
-double seconds(Duration time) {
+double in_seconds(Duration time) {
   return duration<double>(time).count();
 }
 
@@ -28,7 +28,7 @@ TEST(Trajectory, StandsBeforeItsStartAndAfterItsEnd) {
 TEST(Trajectory, TakesTheTimeOfATrapezoid) {
   // 90 units at 90/s with 360/s²: a quarter second to speed up, 11.25 units each way, 67.5 at full speed.
   const auto motion = Trajectory::standstill(0.0, begin).move_to(90.0, {90.0, 360.0, 360.0}, begin);
-  EXPECT_NEAR(seconds(motion.end() - begin), 0.25 + 0.75 + 0.25, 1e-6);
+  EXPECT_NEAR(in_seconds(motion.end() - begin), 0.25 + 0.75 + 0.25, 1e-6);
   EXPECT_NEAR(motion.position(begin + milliseconds(250)), 11.25, 1e-6);
   EXPECT_NEAR(motion.velocity(begin + milliseconds(500)), 90.0, 1e-9);
 }
@@ -37,7 +37,7 @@ TEST(Trajectory, TakesTheTimeOfATriangleWhenTooShortForFullSpeed) {
   const auto motion = Trajectory::standstill(0.0, begin).move_to(-10.0, {90.0, 360.0, 180.0}, begin);
   // v² = 2·10·360·180/(360+180), time = v/360 + v/180.
   const double peak = std::sqrt(2.0 * 10.0 * 360.0 * 180.0 / 540.0);
-  EXPECT_NEAR(seconds(motion.end() - begin), peak / 360.0 + peak / 180.0, 1e-6);
+  EXPECT_NEAR(in_seconds(motion.end() - begin), peak / 360.0 + peak / 180.0, 1e-6);
 }
 
 /// Whatever is asked in the middle of whatever motion: position and speed have no jumps, speed and
@@ -88,7 +88,7 @@ TEST(Trajectory, RunsOnUntilItIsStopped) {
   const TimePoint later = begin + std::chrono::seconds(3);
   EXPECT_NEAR(running.velocity(later), -50.0, 1e-9);
   const auto stopped = running.stop(100.0, later);
-  EXPECT_NEAR(seconds(stopped.end() - later), 0.5, 1e-9);
+  EXPECT_NEAR(in_seconds(stopped.end() - later), 0.5, 1e-9);
   EXPECT_NEAR(stopped.position(stopped.end()), running.position(later) - 12.5, 1e-6);
 }
 

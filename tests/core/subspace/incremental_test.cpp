@@ -8,13 +8,13 @@
 namespace eigenpose {
 namespace {
 
-constexpr std::size_t kLength = 300;
+constexpr std::size_t kObjectLength = 300;
 
 /// Three objects' views as bytes.
 struct Objects {
-  std::vector<std::uint8_t> mug = test::smooth_views(50, kLength, 1);
-  std::vector<std::uint8_t> duck = test::smooth_views(36, kLength, 2);
-  std::vector<std::uint8_t> car = test::smooth_views(72, kLength, 3);
+  std::vector<std::uint8_t> mug = test::smooth_views(50, kObjectLength, 1);
+  std::vector<std::uint8_t> duck = test::smooth_views(36, kObjectLength, 2);
+  std::vector<std::uint8_t> car = test::smooth_views(72, kObjectLength, 3);
 };
 
 std::vector<std::uint8_t> joined(std::initializer_list<const std::vector<std::uint8_t>*> parts) {
@@ -32,14 +32,15 @@ void expect_same_bits(const Eigenspace& a, const Eigenspace& b) {
 
 TEST(IncrementalEigenspace, AddingEqualsLearningAnewBitForBit) {
   const Objects objects;
-  IncrementalEigenspace incremental(kLength, true);
-  incremental.add("mug", ByteSource(objects.mug, kLength));
-  incremental.add("duck", ByteSource(objects.duck, kLength));
-  incremental.add("car", ByteSource(objects.car, kLength));
+  IncrementalEigenspace incremental(kObjectLength, true);
+  incremental.add("mug", ByteSource(objects.mug, kObjectLength));
+  incremental.add("duck", ByteSource(objects.duck, kObjectLength));
+  incremental.add("car", ByteSource(objects.car, kObjectLength));
   const auto all = joined({&objects.mug, &objects.duck, &objects.car});
   SolverReport report;
   const Eigenspace grown = incremental.solve({.components = 12}, &report);
-  expect_same_bits(grown, solve_eigenspace(ByteSource(all, kLength), {.solver = "gram", .components = 12}));
+  expect_same_bits(grown,
+                   solve_eigenspace(ByteSource(all, kObjectLength), {.solver = "gram", .components = 12}));
   EXPECT_EQ(report.components, 12U);
   EXPECT_TRUE(report.exact_integers);
   EXPECT_EQ(incremental.count(), 158U);
@@ -47,19 +48,19 @@ TEST(IncrementalEigenspace, AddingEqualsLearningAnewBitForBit) {
 
 TEST(IncrementalEigenspace, RemovingEqualsLearningAnewBitForBit) {
   const Objects objects;
-  IncrementalEigenspace incremental(kLength, true, 2);
-  incremental.add("mug", ByteSource(objects.mug, kLength));
-  incremental.add("duck", ByteSource(objects.duck, kLength));
-  incremental.add("car", ByteSource(objects.car, kLength));
+  IncrementalEigenspace incremental(kObjectLength, true, 2);
+  incremental.add("mug", ByteSource(objects.mug, kObjectLength));
+  incremental.add("duck", ByteSource(objects.duck, kObjectLength));
+  incremental.add("car", ByteSource(objects.car, kObjectLength));
   incremental.remove("duck");
   EXPECT_EQ(incremental.names(), (std::vector<std::string>{"mug", "car"}));
   const auto left = joined({&objects.mug, &objects.car});
   expect_same_bits(incremental.solve({.components = 12}),
-                   solve_eigenspace(ByteSource(left, kLength), {.solver = "gram", .components = 12}));
-  incremental.add("duck", ByteSource(objects.duck, kLength));
+                   solve_eigenspace(ByteSource(left, kObjectLength), {.solver = "gram", .components = 12}));
+  incremental.add("duck", ByteSource(objects.duck, kObjectLength));
   const auto again = joined({&objects.mug, &objects.car, &objects.duck});
   expect_same_bits(incremental.solve({.components = 12}),
-                   solve_eigenspace(ByteSource(again, kLength), {.solver = "gram", .components = 12}));
+                   solve_eigenspace(ByteSource(again, kObjectLength), {.solver = "gram", .components = 12}));
 }
 
 TEST(IncrementalEigenspace, HoldsForFloatViewsToo) {
@@ -76,33 +77,33 @@ TEST(IncrementalEigenspace, HoldsForFloatViewsToo) {
 
 TEST(IncrementalEigenspace, NeverGoesBackToASource) {
   // The first object's bytes are gone when the second one joins.
-  IncrementalEigenspace incremental(kLength, true);
+  IncrementalEigenspace incremental(kObjectLength, true);
   const Objects objects;
   {
     auto bytes = objects.mug;
-    incremental.add("mug", ByteSource(bytes, kLength));
+    incremental.add("mug", ByteSource(bytes, kObjectLength));
     std::fill(bytes.begin(), bytes.end(), std::uint8_t{0});
   }
-  incremental.add("duck", ByteSource(objects.duck, kLength));
+  incremental.add("duck", ByteSource(objects.duck, kObjectLength));
   const auto all = joined({&objects.mug, &objects.duck});
   expect_same_bits(incremental.solve({.components = 5}),
-                   solve_eigenspace(ByteSource(all, kLength), {.solver = "gram", .components = 5}));
+                   solve_eigenspace(ByteSource(all, kObjectLength), {.solver = "gram", .components = 5}));
 }
 
 TEST(IncrementalEigenspace, SaysWhatItKeeps) {
   const Objects objects;
-  IncrementalEigenspace incremental(kLength, true);
-  incremental.add("mug", ByteSource(objects.mug, kLength));
-  EXPECT_EQ(incremental.memory(), 50U * kLength + 50U * 50U * sizeof(double));
+  IncrementalEigenspace incremental(kObjectLength, true);
+  incremental.add("mug", ByteSource(objects.mug, kObjectLength));
+  EXPECT_EQ(incremental.memory(), 50U * kObjectLength + 50U * 50U * sizeof(double));
 }
 
 TEST(IncrementalEigenspace, RefusesWhatDoesNotFitAndStaysAsItWas) {
   const Objects objects;
-  IncrementalEigenspace incremental(kLength, true);
-  incremental.add("mug", ByteSource(objects.mug, kLength));
-  EXPECT_THROW(incremental.add("mug", ByteSource(objects.duck, kLength)), std::invalid_argument);
-  EXPECT_THROW(incremental.add("duck", ByteSource(objects.duck, kLength / 2)), std::invalid_argument);
-  EXPECT_THROW(incremental.add("duck", FloatSource(test::views_of_rank(kLength, 9, 3, 1))),
+  IncrementalEigenspace incremental(kObjectLength, true);
+  incremental.add("mug", ByteSource(objects.mug, kObjectLength));
+  EXPECT_THROW(incremental.add("mug", ByteSource(objects.duck, kObjectLength)), std::invalid_argument);
+  EXPECT_THROW(incremental.add("duck", ByteSource(objects.duck, kObjectLength / 2)), std::invalid_argument);
+  EXPECT_THROW(incremental.add("duck", FloatSource(test::views_of_rank(kObjectLength, 9, 3, 1))),
                std::invalid_argument);
   EXPECT_THROW(incremental.remove("duck"), std::invalid_argument);
   EXPECT_EQ(incremental.count(), 50U);
@@ -140,7 +141,7 @@ TEST(Orthogonalize, HoldsEveryObjectsEigenspace) {
   std::vector<Eigenspace> spaces;
   std::vector<const std::vector<std::uint8_t>*> sets{&objects.mug, &objects.duck, &objects.car};
   for (const auto* bytes : sets) {
-    spaces.push_back(solve_eigenspace(ByteSource(*bytes, kLength), {.components = 4}));
+    spaces.push_back(solve_eigenspace(ByteSource(*bytes, kObjectLength), {.components = 4}));
   }
   const Eigenspace joint = orthogonalize(std::span<const Eigenspace>(spaces));
   EXPECT_LE(joint.components(), 3 * 4 + 2);
