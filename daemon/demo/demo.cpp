@@ -133,11 +133,21 @@ std::vector<Placement> plan(const Options& options, const std::vector<std::strin
   return placements;
 }
 
+/// What the daemon said last; an empty object while it has not looked at a picture since it learned.
+json latest_result(ApiClient& api) {
+  try {
+    return api.get("/v1/results/latest");
+  } catch (const ApiError& error) {
+    if (error.status() != 404) throw;
+    return json::object();
+  }
+}
+
 /// The first settled result of a picture taken after `since` (monotonic seconds).
 json settled_result(ApiClient& api, double since) {
   const double deadline = monotonic_seconds() + 20.0;
   while (monotonic_seconds() < deadline) {
-    const json result = api.get("/v1/results/latest");
+    const json result = latest_result(api);
     if (result.value("state", "") == "settled" && result.value("exposure_monotonic_s", 0.0) > since)
       return result;
     SteadyClock().sleep_for(std::chrono::milliseconds(20));
