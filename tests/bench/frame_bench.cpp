@@ -176,7 +176,7 @@ void measure(std::span<const ImageSet> sets, const std::vector<cv::Mat>& picture
 
 int run(int objects) {
   cv::setNumThreads(1);
-  const testing::TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   for (int o = 0; o < objects; ++o) testing::write_turn(folder.path(), "obj" + std::to_string(o), o, views);
   const auto sets = open_image_sets(folder.path());
   const std::vector<cv::Mat> pictures = make_frames(objects);

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/image/image_set.h"
 #include "tests/daemon/fakes.h"
-#include "tests/daemon/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -51,7 +51,7 @@ class AcquisitionTest : public testing::Test {
     return report;
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   SteadyClock clock_;
   FakeAxisRecord table_record_;
   FakeAxisRecord arm_record_;

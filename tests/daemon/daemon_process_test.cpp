@@ -17,7 +17,7 @@
 
 #include "daemon/client/api_client.h"
 #include "sim/lab/lab_client.h"
-#include "tests/daemon/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 extern char** environ;
 
@@ -80,7 +80,7 @@ class DaemonProcess : public testing::Test {
     text << stream.rdbuf();
     return text.str();
   }
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::filesystem::path run_ = folder_.path() / "run";
   std::filesystem::path state_ = folder_.path() / "state";
   std::filesystem::path log_ = folder_.path() / "log";

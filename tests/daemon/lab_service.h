@@ -14,7 +14,7 @@
 #include "core/base/clock.h"
 #include "daemon/service.h"
 #include "sim/lab/lab_client.h"
-#include "tests/daemon/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 
@@ -86,7 +86,7 @@ class LabService {
   }
 
  private:
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   SteadyClock clock_;
   Config config_;
   std::unique_ptr<Service> service_;

@@ -13,7 +13,7 @@
 
 #include "daemon/api/event_log.h"
 #include "daemon/client/api_client.h"
-#include "tests/daemon/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -99,7 +99,7 @@ class ServerTest : public testing::Test {
     EXPECT_THAT(client.read_all(), HasSubstr("hello from /hello"));
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   UnixSocket socket_{folder_.path() / "s.sock", 0600, ""};
   std::shared_ptr<EventLog> log_ = std::make_shared<EventLog>(8);
   std::unique_ptr<Server> server_;

@@ -140,7 +140,7 @@ TEST(SimulatedLab, LearningWithoutACompleteSetSaysToAcquireFirst) {
 }
 
 TEST(SimulatedLab, ADamagedModelIsToldAndLeftWhereItIs) {
-  TemporaryFolder folder;
+  test::TemporaryFolder folder;
   const std::filesystem::path file = folder.path() / "model.h5";
   std::ofstream(file) << "not a model";
   ModelStore store(file);

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
-#include "tests/daemon/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -39,7 +39,7 @@ void leave_stale_socket(const std::filesystem::path& path) {
 
 class UnixSocketTest : public testing::Test {
  protected:
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::filesystem::path path_ = folder_.path() / "s.sock";
 };
 

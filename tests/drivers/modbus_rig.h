@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <ostream>
 
 #include "core/base/clock.h"
 #include "drivers/modbus/modbus_axis.h"
@@ -17,6 +18,10 @@
 namespace eigenpose {
 
 enum class ModbusLine { tcp, rtu };
+
+inline std::ostream& operator<<(std::ostream& stream, ModbusLine line) {
+  return stream << (line == ModbusLine::tcp ? "Tcp" : "Rtu");
+}
 
 constexpr std::chrono::milliseconds rig_response_timeout{40};
 

@@ -30,7 +30,7 @@ struct LearnedWorld {
 
   LearnedWorld();
 
-  TemporaryFolder folder;
+  test::TemporaryFolder folder;
   std::vector<ImageSet> sets;
   LearningReport report;
   std::shared_ptr<const Model> model;

@@ -1,19 +1,21 @@
 #pragma once
 
-/// A folder that is gone after the test.
+/// A folder of one test, gone at its end.
 
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <stdlib.h>
 
-namespace eigenpose::testing {
+namespace eigenpose::test {
 
+/// Its path is short, so that the paths of sockets in it fit.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "eigenpose-test-XXXXXX").string();
+    std::string pattern = (std::filesystem::temp_directory_path() / "eigenpose-XXXXXX").string();
     if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("cannot make " + pattern);
     path_ = pattern;
   }
@@ -29,4 +31,4 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-}  // namespace eigenpose::testing
+}  // namespace eigenpose::test

@@ -44,7 +44,7 @@ class CoilImport : public ::testing::Test {
   }
 
  private:
-  testing::TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(CoilImport, ReadsAnIndexAsStepsAndANumberAsDegrees) {

@@ -34,7 +34,7 @@ class ImageSetFiles : public ::testing::Test {
   }
 
  private:
-  testing::TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(ImageSetFiles, GivesBackViewsAndPoses) {
@@ -156,7 +156,7 @@ TEST_F(ImageSetFiles, ListsSetsWithNumbersInTheirOrder) {
   for (const ImageSet& set : open_image_sets(root())) names.push_back(set.object());
   EXPECT_THAT(names, ::testing::ElementsAre("cup", "obj1", "obj9", "obj10"));
   EXPECT_EQ(open_image_sets(root() / "obj9").size(), 1U);
-  const testing::TemporaryFolder empty;
+  const test::TemporaryFolder empty;
   EXPECT_THROW(open_image_sets(empty.path()), FileError);
 }
 

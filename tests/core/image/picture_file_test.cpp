@@ -61,7 +61,7 @@ TEST(PictureFile, RefusesTruncatedJpegAndPgm) {
 }
 
 TEST(PictureFile, SaysWhatIsWrongWithAFile) {
-  const testing::TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   EXPECT_THAT(refusal({}), HasSubstr("is empty"));
   EXPECT_THAT(refusal({'h', 'e', 'l', 'l', 'o'}), HasSubstr("not a picture"));
   EXPECT_THROW(load_picture(folder.path() / "absent.png"), FileError);

@@ -34,7 +34,7 @@ class ModelFile : public ::testing::Test {
   }
 
  private:
-  testing::TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::filesystem::path file_;
 };
 

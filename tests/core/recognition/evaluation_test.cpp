@@ -49,7 +49,7 @@ TEST(Evaluation, ReachesThePublishedFiguresOnCoil20) {
   if (datasets == nullptr || !std::filesystem::exists(std::filesystem::path(datasets) / "coil-20"))
     GTEST_SKIP()
         << "missed: recognition and pose on COIL-20; set EIGENPOSE_DATASETS to a folder with coil-20";
-  const testing::TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   const ImportReport imported =
       import_coil(std::filesystem::path(datasets) / "coil-20", folder.path(), {.angle = {5.0}});
   ASSERT_EQ(imported.sets.size(), 20U);

@@ -41,7 +41,7 @@ class Learning : public ::testing::Test {
   }
 
  private:
-  testing::TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(Learning, SeesFromTheViewsWhichPosesCanBeSeen) {

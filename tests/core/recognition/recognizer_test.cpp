@@ -102,7 +102,7 @@ TEST(Recognizer, TellsThatASymmetricObjectsPoseCannotBeSeen) {
 }
 
 TEST(Recognizer, SaysAmbiguousBetweenTwoObjectsThatLookAlike) {
-  const testing::TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   testing::write_turn(folder.path(), "left", 1, 24);
   SceneKnobs again;
   again.noise_sigma = 1.2;
