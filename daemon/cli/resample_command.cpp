@@ -15,7 +15,7 @@
 namespace eigenpose::cli {
 namespace {
 
-constexpr const char* examples = R"(
+constexpr const char* resample_examples = R"(
 Writes points of the continuous manifolds, evenly spaced along each degree of freedom. HDF5 (.h5) has one group an
 object with the tables q and points; CSV has one file an object.
 
@@ -23,7 +23,7 @@ Examples:
   eigenpose resample lab.model --per-turn 360 --to lab.h5
   eigenpose resample lab.model --objects mug --to mug.csv)";
 
-struct Options {
+struct ResampleOptions {
   std::string model;
   std::string to;
   std::vector<std::string> objects;
@@ -45,7 +45,7 @@ std::vector<std::size_t> chosen_objects(const Model& model, const std::vector<st
   return chosen;
 }
 
-int run(const Options& options) {
+int run_resample(const ResampleOptions& options) {
   const Model model = load_model(options.model);
   const auto files =
       write_resampled(model, chosen_objects(model, options.objects), options.resampling, options.to);
@@ -56,9 +56,9 @@ int run(const Options& options) {
 }  // namespace
 
 void add_resample_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ResampleOptions>();
   CLI::App* command = app.add_subcommand("resample", "Write a model's manifolds as dense tables");
-  command->footer(examples);
+  command->footer(resample_examples);
   command->add_option("model", options->model, "The model file")->required();
   command->add_option("--to", options->to, "The file to write: .h5 or .csv")->required();
   command->add_option("--per-turn", options->resampling.per_turn, "Points on a closed axis")
@@ -70,7 +70,7 @@ void add_resample_command(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
   command->add_option("--objects", options->objects, "Only these objects, e.g. mug,duck")->delimiter(',');
-  command->callback([options, &line] { line.action = [options] { return run(*options); }; });
+  command->callback([options, &line] { line.action = [options] { return run_resample(*options); }; });
 }
 
 }  // namespace eigenpose::cli

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 constexpr int side = 32;
-constexpr float rounding = 1e-4F;  ///< of sums of some grey levels in float
+constexpr float sum_rounding = 1e-4F;  ///< of sums of some grey levels in float
 
 NormalizationOptions options_of(const std::string& type) {
   NormalizationOptions options;
@@ -57,7 +57,7 @@ double energy(std::span<const float> numbers) {
 
 TEST(ImageType, GradientOfARampIsItsSlopeEverywhere) {
   const auto appearance = made("gradient", grey_picture([](int x, int y) { return 3.0F * x + 4.0F * y; }));
-  for (const float value : appearance) EXPECT_NEAR(value, 5.0F, rounding);
+  for (const float value : appearance) EXPECT_NEAR(value, 5.0F, sum_rounding);
 }
 
 TEST(ImageType, GradientIsTheSameOnAPictureTurnedByAQuarter) {
@@ -66,17 +66,17 @@ TEST(ImageType, GradientIsTheSameOnAPictureTurnedByAQuarter) {
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x)
       ASSERT_NEAR(turned[static_cast<std::size_t>(y * side + x)],
-                  straight[static_cast<std::size_t>((side - 1 - x) * side + y)], rounding);
+                  straight[static_cast<std::size_t>((side - 1 - x) * side + y)], sum_rounding);
 }
 
 TEST(ImageType, LaplacianOfAPlaneIsZeroAndOfAParabolaConstant) {
   for (const float value :
        made("laplacian", grey_picture([](int x, int y) { return 2.0F * x + 5.0F * y + 7.0F; })))
-    EXPECT_NEAR(value, 0.0F, rounding);
+    EXPECT_NEAR(value, 0.0F, sum_rounding);
   const auto bowl = made("laplacian", grey_picture([](int x, int y) { return 0.25F * (x * x + y * y); }));
   for (int y = 1; y + 1 < side; ++y)
     for (int x = 1; x + 1 < side; ++x)
-      EXPECT_NEAR(bowl[static_cast<std::size_t>(y * side + x)], 1.0F, rounding);
+      EXPECT_NEAR(bowl[static_cast<std::size_t>(y * side + x)], 1.0F, sum_rounding);
 }
 
 TEST(ImageType, FourierMagnitudeDoesNotChangeWhenThePictureIsShiftedAround) {
