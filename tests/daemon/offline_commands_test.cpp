@@ -63,7 +63,7 @@ class OfflineCommands : public ::testing::Test {
   }
 
  private:
-  testing::TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(OfflineCommands, KeepTheImageTypeInTheModelAndUseItEverywhere) {

@@ -34,7 +34,7 @@ Ended run(const std::string& arguments) {
 }
 
 TEST(Example, LearnsAndRecognizesWithTheLibraryAlone) {
-  const testing::TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   const auto sets = folder.path() / "sets";
   testing::write_turn(sets, "duck", 1, 24);
   testing::write_turn(sets, "mug", 2, 24);
