@@ -1,7 +1,10 @@
 #include "core/subspace/sta_code.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
@@ -22,6 +25,29 @@ using Eigen::MatrixXd;
 /// A block, without the heap: at most 16 × 16.
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 16, 16>;
 
+using SmallBlock = std::array<double, 256>;  ///< row by row
+
+/// down · pixels · acrossᵀ. @tparam Width of the block where it is known, so that loops unroll; otherwise 0.
+template <std::size_t Width>
+void cosines(const SmallBlock& pixels, const MatrixXd& down, const MatrixXd& across,
+             SmallBlock& frequencies) {
+  const std::size_t width = Width > 0 ? Width : static_cast<std::size_t>(across.rows());
+  const Index height = down.rows();
+  std::array<double, Width == 0 ? 16 : Width> row;
+  for (Index u = 0; u < height; ++u) {
+    for (std::size_t x = 0; x < width; ++x) row[x] = 0.0;
+    for (Index y = 0; y < height; ++y)
+      for (std::size_t x = 0; x < width; ++x)
+        row[x] += down(u, y) * pixels[static_cast<std::size_t>(y) * width + x];
+    double* out = frequencies.data() + static_cast<std::size_t>(u) * width;
+    for (std::size_t c = 0; c < width; ++c) out[c] = 0.0;
+    for (std::size_t x = 0; x < width; ++x) {
+      const double* column = across.data() + x * width;
+      for (std::size_t c = 0; c < width; ++c) out[c] += row[x] * column[c];
+    }
+  }
+}
+
 /// Orthonormal DCT-II of n numbers, one row a frequency.
 MatrixXd cosine_matrix(std::size_t n) {
   MatrixXd matrix(static_cast<Index>(n), static_cast<Index>(n));
@@ -35,26 +61,27 @@ MatrixXd cosine_matrix(std::size_t n) {
   return matrix;
 }
 
-/// Sets the smallest coefficients to zero while their energy stays within `budget`. @return how many reach to
-/// the last one kept.
-std::size_t drop_small(std::vector<double>& coefficients, std::vector<std::size_t>& order, double budget) {
-  order.clear();
-  double candidates = 0.0;
+/// Sets small coefficients to zero while their energy stays within `budget`: octave of energy by octave, the
+/// smallest first; of the last octave those of high frequency first. @return how many reach to the last one
+/// kept.
+std::size_t drop_small(std::vector<double>& coefficients, double budget) {
+  std::array<double, 256> octaves{};
+  std::array<std::uint8_t, 256> octave_of{};
   for (std::size_t i = 0; i < coefficients.size(); ++i) {
     const double energy = coefficients[i] * coefficients[i];
-    if (energy > budget) continue;
-    order.push_back(i);
-    candidates += energy;
+    octave_of[i] = static_cast<std::uint8_t>(std::bit_cast<std::uint32_t>(static_cast<float>(energy)) >> 23U);
+    octaves[octave_of[i]] += energy;
   }
-  if (candidates > budget) {
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return std::abs(coefficients[a]) < std::abs(coefficients[b]);
-    });
-  }
+  std::size_t open = 0;  // the first octave that does not go as a whole
   double dropped = 0.0;
-  for (const std::size_t i : order) {
-    dropped += coefficients[i] * coefficients[i];
-    if (dropped > budget) break;
+  while (open < octaves.size() && dropped + octaves[open] <= budget) dropped += octaves[open++];
+  for (std::size_t i = coefficients.size(); i-- > 0;) {
+    if (octave_of[i] > open) continue;
+    const double energy = coefficients[i] * coefficients[i];
+    if (octave_of[i] == open) {
+      if (dropped + energy > budget) continue;
+      dropped += energy;
+    }
     coefficients[i] = 0.0;
   }
   std::size_t width = coefficients.size();
@@ -65,10 +92,9 @@ std::size_t drop_small(std::vector<double>& coefficients, std::vector<std::size_
 /// Appends the block of view `j` to its position, as a new superblock or as part of the last one. @return
 /// what that changes in the view: ‖block − its stand-in‖².
 double append_block(CodedPosition& position, std::size_t j, const std::vector<double>& block,
-                    double spatial_budget, double temporal_budget, std::vector<double>& coded,
-                    std::vector<std::size_t>& order) {
+                    double spatial_budget, double temporal_budget, std::vector<double>& coded) {
   coded = block;
-  const std::size_t width = drop_small(coded, order, spatial_budget);
+  const std::size_t width = drop_small(coded, spatial_budget);
   const auto distance = [&](const std::vector<double>& from) {
     const Superblock& last = position.superblocks.back();
     double sum = 0.0;
@@ -110,20 +136,19 @@ BlockTransform::Corner BlockTransform::corner(std::size_t position) const {
 
 void BlockTransform::forward(const double* view, std::size_t position, double* coefficients) const {
   const Corner at = corner(position);
-  SmallMatrix pixels = SmallMatrix::Zero(down_.rows(), across_.rows());
-  for (std::size_t y = 0; y < std::min(height_, shape_.rows - at.row); ++y) {
-    for (std::size_t x = 0; x < std::min(width_, shape_.columns - at.column); ++x) {
-      pixels(static_cast<Index>(y), static_cast<Index>(x)) =
-          view[((at.row + y) * shape_.columns + at.column + x) * shape_.bands + at.band];
-    }
+  SmallBlock pixels{};
+  const std::size_t rows = std::min(height_, shape_.rows - at.row);
+  const std::size_t columns = std::min(width_, shape_.columns - at.column);
+  for (std::size_t y = 0; y < rows; ++y) {
+    const double* row = view + ((at.row + y) * shape_.columns + at.column) * shape_.bands + at.band;
+    for (std::size_t x = 0; x < columns; ++x) pixels[y * width_ + x] = row[x * shape_.bands];
   }
-  // Blocks are too small for a blocked product to pay.
-  const SmallMatrix rows = down_.lazyProduct(pixels);
-  const SmallMatrix frequencies = rows.lazyProduct(across_.transpose());
-  for (std::size_t c = 0; c < zigzag_.size(); ++c) {
-    coefficients[c] =
-        frequencies(static_cast<Index>(zigzag_[c] / width_), static_cast<Index>(zigzag_[c] % width_));
-  }
+  SmallBlock frequencies;
+  if (width_ == 8)
+    cosines<8>(pixels, down_, across_, frequencies);
+  else
+    cosines<0>(pixels, down_, across_, frequencies);
+  for (std::size_t c = 0; c < zigzag_.size(); ++c) coefficients[c] = frequencies[zigzag_[c]];
 }
 
 void BlockTransform::add_inverse(const double* coefficients, std::size_t position, double* view) const {
@@ -190,11 +215,10 @@ StaCode sta_code(const AppearanceSource& source, const BlockTransform& transform
     MatrixXd changes(static_cast<Index>(n), static_cast<Index>(transform.positions()));
     parallel_for(transform.positions(), threads, [&](std::size_t p) {
       std::vector<double> coefficients(transform.size()), coded(transform.size());
-      std::vector<std::size_t> order(transform.size());
       for (std::size_t v = 0; v < n; ++v) {
         transform.forward(views.col(static_cast<Index>(v)).data(), p, coefficients.data());
-        changes(static_cast<Index>(v), static_cast<Index>(p)) = append_block(
-            code.positions[p], first + v, coefficients, spatial_budget, temporal_budget, coded, order);
+        changes(static_cast<Index>(v), static_cast<Index>(p)) =
+            append_block(code.positions[p], first + v, coefficients, spatial_budget, temporal_budget, coded);
       }
     });
     code.changes.segment(static_cast<Index>(first), static_cast<Index>(n)) = changes.rowwise().sum();

@@ -72,7 +72,7 @@ struct StaCode {
   [[nodiscard]] std::size_t bytes() const;  ///< memory of the coefficients and superblocks
 };
 
-/// Codes all views of `source`, reading them once. Spatial: per block the smallest coefficients go while
+/// Codes all views of `source`, reading them once. Spatial: per block small coefficients go while
 /// their energy stays within spatial² / blocks. Temporal: a run goes on while the block differs from the
 /// run's first by an energy within temporal² / blocks. So ‖Δⱼ‖ ≤ spatial + temporal.
 /// @param memory_limit for the code, bytes; 0 means none. @throws std::invalid_argument beyond it,
