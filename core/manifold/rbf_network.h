@@ -7,7 +7,9 @@
 /// centre, a dyadic ladder gives possible widths, and the unit that explains most of what is left is added,
 /// all weights being solved again by least squares (orthogonal matching pursuit). When the error bound is
 /// met, units are taken away again while it stays met. The result is a small network for the bound, not
-/// provably the smallest.
+/// provably the smallest. Choosing instead the strongest local maximum of the residual seen by Mexican hat
+/// wavelets gave larger networks: 533 units against 419 for the poses of COIL-20 at a bound of 0.1, 893
+/// against 721 at 0.03, 1181 against 1052 at 0.01, and larger errors between samples.
 ///
 /// Angles are learned as (cos, sin), never as numbers that jump at the seam.
 
