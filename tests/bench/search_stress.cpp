@@ -36,6 +36,7 @@ struct Tally {
   std::mutex mutex;
   std::atomic<std::size_t> queries{0};
   std::atomic<std::size_t> of_several_dofs{0};
+  std::atomic<std::size_t> missed_by_oracle{0};  ///< answers of searches that are nearer, and really there
   std::size_t wrong[3] = {0, 0, 0};
   double worst[3] = {0.0, 0.0, 0.0};
 };
@@ -90,6 +91,10 @@ class Comparison {
         continue;
       }
       if (count == 0) continue;
+      if (found.distance < truth[0].distance - promised && is_there(found, point)) {
+        ++tally_.missed_by_oracle;
+        continue;
+      }
       const double difference = std::abs(found.distance - truth[0].distance);
       worst_[k] = std::max(worst_[k], difference);
       const bool clear = expected < 2 || truth[1].distance - truth[0].distance > 2.0 * promised;
@@ -99,6 +104,14 @@ class Comparison {
   }
 
  private:
+  /// Whether the manifold really comes that near: the oracle starts from a grid, which can be too coarse for
+  /// surfaces through very few samples.
+  [[nodiscard]] bool is_there(const ClosestPoint& found, const Eigen::VectorXf& point) const {
+    const Manifold& f = oracle_->manifolds()[found.manifold];
+    const Eigen::VectorXd value = f.evaluate(std::span(found.q).first(f.dofs()));
+    return std::abs((point.cast<double>() - value).norm() - found.distance) < promised;
+  }
+
   Tally& tally_;
   std::unique_ptr<ManifoldSearch> oracle_;
   std::vector<std::unique_ptr<ManifoldSearch>> searches_;
@@ -155,6 +168,9 @@ int main(int count, char** arguments) {
     if (patches) tally.of_several_dofs += queries;
   });
   std::printf("%zu of the queries about manifolds of several DOFs\n", tally.of_several_dofs.load());
+  if (tally.missed_by_oracle > 0)
+    std::printf("%zu answers are nearer than the oracle's, and lie on the manifold\n",
+                tally.missed_by_oracle.load());
   std::size_t wrong = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     std::printf("%-6s %zu queries, %zu different from the oracle, largest difference of distance %.2e\n",
