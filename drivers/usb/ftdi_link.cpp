@@ -236,7 +236,7 @@ class FtdiLink::Device {
     const int result =
         libusb_bulk_transfer(handle_.get(), endpoint_out_, const_cast<std::uint8_t*>(bytes.data()),
                              static_cast<int>(bytes.size()), &sent, milliseconds(timeout));
-    if (result != 0 && result != LIBUSB_ERROR_TIMEOUT) fail(result, "write");
+    if (result != 0 && result != LIBUSB_ERROR_TIMEOUT) fail_at(endpoint_out_, result, "write");
     return static_cast<std::size_t>(sent);
   }
 
@@ -245,7 +245,7 @@ class FtdiLink::Device {
     int count = 0;
     const int result = libusb_bulk_transfer(handle_.get(), endpoint_in_, packets_.data(),
                                             static_cast<int>(packets_.size()), &count, milliseconds(timeout));
-    if (result != 0 && result != LIBUSB_ERROR_TIMEOUT) fail(result, "read");
+    if (result != 0 && result != LIBUSB_ERROR_TIMEOUT) fail_at(endpoint_in_, result, "read");
     std::uint8_t errors = 0;
     for (int start = 0; start + status_bytes <= count; start += packet_size_) {
       const int end = std::min(start + packet_size_, count);
@@ -278,6 +278,12 @@ class FtdiLink::Device {
   [[noreturn]] void damaged(const std::string& what) {
     received_.clear();
     throw DeviceError(name_, "read", what);
+  }
+
+  /// A halted endpoint refuses everything until it is told to go on; so the next call finds it ready.
+  [[noreturn]] void fail_at(std::uint8_t endpoint, int result, const std::string& operation) const {
+    if (result == LIBUSB_ERROR_PIPE) libusb_clear_halt(handle_.get(), endpoint);
+    fail(result, operation);
   }
 
   [[noreturn]] void fail(int result, const std::string& operation) const {

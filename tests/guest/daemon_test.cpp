@@ -32,6 +32,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
+constexpr double faster = 10.0;  ///< than real motors
+
 /// The luma that stands for an angle: 40 at 0°, 220 at 360°.
 double luma_of(double angle_deg) {
   return 40.0 + 0.5 * angle_deg;
@@ -69,7 +71,7 @@ class Service {
 /// serial port.
 class StageOnTheCable {
  public:
-  explicit StageOnTheCable(sim::SimLab& lab) : controller_(lab, faster()) {
+  explicit StageOnTheCable(sim::SimLab& lab) : controller_(lab, quick_stage()) {
     descriptor_ = open("/dev/ttyS1", O_RDWR | O_NOCTTY | O_CLOEXEC);
     if (descriptor_ < 0) throw std::runtime_error("/dev/ttyS1: is the guest run with --ftdi?");
     termios line{};
@@ -89,9 +91,9 @@ class StageOnTheCable {
   StageOnTheCable& operator=(const StageOnTheCable&) = delete;
 
  private:
-  static sim::AptControllerOptions faster() {
+  static sim::AptControllerOptions quick_stage() {
     sim::AptControllerOptions options;
-    options.speed_factor = 10.0;
+    options.speed_factor = faster;
     return options;
   }
 
@@ -166,7 +168,10 @@ class UsbPlug {
 class DaemonInTheGuest : public testing::Test {
  protected:
   DaemonInTheGuest()
-      : lab_(clock_, {}), drives_(lab_, {}), stage_(lab_), pictures_([this](cv::Mat& luma) { draw(luma); }) {
+      : lab_(clock_, {}),
+        drives_(lab_, {.speed_factor = faster}),
+        stage_(lab_),
+        pictures_([this](cv::Mat& luma) { draw(luma); }) {
     fs::create_directories(folder_);
     std::ofstream(folder_ / "rig.toml") << config();
   }

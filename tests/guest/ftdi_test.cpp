@@ -1,29 +1,24 @@
 // FtdiLink and an APT stage behind it, on an emulated FTDI chip, the kernel's USB and its ftdi_sio. Runs in
 // the guest.
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <mutex>
 #include <thread>
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <termios.h>
-#include <unistd.h>
 
 #include "core/base/error.h"
 #include "drivers/usb/apt_axis.h"
 #include "drivers/usb/ftdi_link.h"
 #include "sim/lab/sim_lab.h"
 #include "sim/usb/apt_controller.h"
+#include "tests/guest/far_end.h"
 
-namespace eigenpose {
+namespace eigenpose::test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -32,58 +27,6 @@ using testing::HasSubstr;
 /// How much slower the emulated machine may be.
 constexpr int slowness = 5;
 constexpr Duration return_time = 2s;  ///< within which a device that is back must work again
-
-const char* const far_end_device = "/dev/ttyS1";
-
-/// What is wired to the chip's serial side: the guest's second serial port, and someone who answers there.
-class FarEnd {
- public:
-  using Answer = std::function<std::vector<std::uint8_t>(std::span<const std::uint8_t>)>;
-
-  /// @param answer to what came in; also called with nothing now and then, for what a device says by itself.
-  explicit FarEnd(Answer answer)
-      : answer_(std::move(answer)), port_(open(far_end_device, O_RDWR | O_NOCTTY)) {
-    termios settings{};
-    tcgetattr(port_, &settings);
-    cfmakeraw(&settings);
-    cfsetspeed(&settings, B115200);
-    settings.c_cflag |= CLOCAL;
-    tcsetattr(port_, TCSANOW, &settings);
-    tcflush(port_, TCIOFLUSH);
-    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
-  }
-  FarEnd(const FarEnd&) = delete;
-  FarEnd& operator=(const FarEnd&) = delete;
-  ~FarEnd() {
-    thread_.request_stop();
-    thread_.join();
-    close(port_);
-  }
-
- private:
-  void run(const std::stop_token& stop) {
-    std::array<std::uint8_t, 256> buffer{};
-    while (!stop.stop_requested()) {
-      pollfd polled{port_, POLLIN, 0};
-      poll(&polled, 1, 5);
-      const ssize_t count = (polled.revents & POLLIN) != 0 ? read(port_, buffer.data(), buffer.size()) : 0;
-      const auto answer = answer_(std::span(buffer).first(count > 0 ? static_cast<std::size_t>(count) : 0));
-      for (std::size_t sent = 0; sent < answer.size();) {
-        const ssize_t written = write(port_, answer.data() + sent, answer.size() - sent);
-        if (written <= 0) break;
-        sent += static_cast<std::size_t>(written);
-      }
-    }
-  }
-
-  Answer answer_;
-  int port_;
-  std::jthread thread_;
-};
-
-std::vector<std::uint8_t> echo(std::span<const std::uint8_t> bytes) {
-  return {bytes.begin(), bytes.end()};
-}
 
 /// The hand on the plug: the hub's port is switched off and on.
 class Plug {
@@ -169,6 +112,7 @@ TEST_F(FtdiChip, IsListedWithItsNumbersAndPlace) {
 }
 
 TEST_F(FtdiChip, CarriesBytesBothWaysWithoutItsStatusBytes) {
+  Echo echo;
   const FarEnd far_end(echo);
   FtdiLink link({}, clock_);
   link.reopen(soon());
@@ -223,6 +167,7 @@ TEST_F(FtdiChip, CannotBeTakenTwice) {
 }
 
 TEST_F(FtdiChip, IsLostInTheMiddleOfAReadAndWorksAgainWhenItIsBack) {
+  Echo echo;
   const FarEnd far_end(echo);
   const Plug plug;
   FtdiLink link({}, clock_);
@@ -243,6 +188,7 @@ TEST_F(FtdiChip, IsLostInTheMiddleOfAReadAndWorksAgainWhenItIsBack) {
 }
 
 TEST_F(FtdiChip, IsUnpluggedAndRepluggedManyTimesWithoutALeak) {
+  Echo echo;
   const FarEnd far_end(echo);
   const Plug plug;
   FtdiLink link({}, clock_);
@@ -283,15 +229,13 @@ TEST_F(FtdiChip, IsUnpluggedAndRepluggedManyTimesWithoutALeak) {
 TEST_F(FtdiChip, CarriesAnAptStageThroughAnUnplugInTheMiddleOfAMove) {
   sim::SimLab lab(clock_);
   sim::AptController controller(lab, {});
-  const FarEnd far_end([&](std::span<const std::uint8_t> bytes) {
-    return bytes.empty() ? controller.spontaneous() : controller.receive(bytes);
-  });
+  const FarEnd far_end(controller);
   const Plug plug;
   AptAxisOptions options;
   options.stage = apt_stage("PRM1-Z8");
   options.speed = 20.0;
   options.acceleration = 200.0;
-  options.patience.start_time = 2s;
+  options.patience.start_time = 1s;
   options.patience.settle_time = 2s;
   options.response_timeout = 1s;
   AptAxis axis(options, std::make_unique<FtdiLink>(FtdiLinkOptions{}, clock_), clock_);
@@ -314,4 +258,4 @@ TEST_F(FtdiChip, CarriesAnAptStageThroughAnUnplugInTheMiddleOfAMove) {
 }
 
 }  // namespace
-}  // namespace eigenpose
+}  // namespace eigenpose::test
