@@ -85,6 +85,7 @@ CameraOptions read_camera(const TomlTable& table, const std::filesystem::path& b
     options.serial = table.text("serial", "");
     options.bus_path = table.text("bus_path", "");
     options.device = table.text("device", "");
+    if (table.has("input")) options.input = static_cast<int>(table.integer("input", std::nullopt, 0, 63));
     options.format = table.choice("format", options.format, {"auto", "YUYV", "NV12", "GREY", "MJPG"});
     options.color = table.flag("color", options.color);
     options.lock_automatics = table.flag("lock_automatics", options.lock_automatics);

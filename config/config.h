@@ -46,6 +46,7 @@ struct CameraOptions {
   std::string serial;            ///< v4l2: USB serial number; empty: does not matter
   std::string bus_path;          ///< v4l2: the socket it is plugged into; empty: does not matter
   std::filesystem::path device;  ///< v4l2: /dev/video0; empty: does not matter
+  std::optional<int> input;      ///< v4l2: of a device that has several; none: the one that is chosen
   bool color = true;             ///< v4l2: false reads grey only
   bool lock_automatics = true;   ///< v4l2: automatic exposure, gain, white balance and focus are turned off
   std::string format = "auto";   ///< v4l2: "YUYV", "NV12", "GREY", "MJPG", or "auto"

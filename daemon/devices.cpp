@@ -25,6 +25,8 @@
 #include "sim/lab/sim_lab.h"
 #include "sim/lab/sim_lamp.h"
 #include "sim/modbus/modbus_server.h"
+#include "sim/usb/apt_controller.h"
+#include "sim/usb/sim_link.h"
 #endif
 
 namespace eigenpose {
@@ -72,6 +74,7 @@ FrameHub::OpenCamera v4l2_camera(const CameraOptions& camera, Workbench& bench) 
   V4l2CameraOptions options;
   options.name = camera.name;
   options.selector = {camera.serial, camera.bus_path, "", camera.device.string()};
+  options.input = camera.input;
   options.mode.width = camera.width;
   options.mode.height = camera.height;
   options.mode.frames_per_second = camera.frames_per_second;
@@ -139,10 +142,33 @@ std::string usb_serial(const std::string& endpoint) {
   return endpoint.substr(scheme.size());
 }
 
+#ifdef EIGENPOSE_SIM
+/// The simulated light arm on an APT controller, and the cable to it.
+struct SimulatedArm {
+  SimulatedArm(std::shared_ptr<SimulatedLab> lab_it_stands_in, const sim::AptControllerOptions& options,
+               const Clock& clock)
+      : lab(std::move(lab_it_stands_in)), controller(lab->lab, options), cable(controller, clock) {}
+  std::shared_ptr<SimulatedLab> lab;
+  sim::AptController controller;
+  sim::Cable cable;
+};
+
+std::shared_ptr<SimulatedArm> simulated_arm(const AptStage& stage, Workbench& bench) {
+  if (stage.unit != "deg")
+    throw std::invalid_argument(
+        fmt::format("the simulated arm turns, and {} moves in {}", stage.name, stage.unit));
+  sim::AptControllerOptions options;
+  options.model = stage.name;
+  options.stepper = stage.stepper;
+  options.counts_per_degree = stage.counts_per_unit;
+  options.velocity_per_degree = stage.velocity_per_unit;
+  options.acceleration_per_degree = stage.acceleration_per_unit;
+  options.speed_factor = bench.config.sim->speed_factor;
+  return std::make_shared<SimulatedArm>(bench.lab, options, bench.clock);
+}
+#endif
+
 std::function<std::unique_ptr<Axis>()> apt_axis(const AxisOptions& axis, Workbench& bench) {
-  FtdiLinkOptions link;
-  link.serial = usb_serial(axis.endpoint);
-  link.flow_control = FtdiFlowControl::rts_cts;
   AptAxisOptions options;
   options.name = axis.dof.name;
   options.dof = axis.dof;
@@ -151,6 +177,15 @@ std::function<std::unique_ptr<Axis>()> apt_axis(const AxisOptions& axis, Workben
   options.zero_offset = axis.home_offset;
   options.speed = axis.speed.value_or(0.0);
   options.arrival_tolerance = axis.arrival_tolerance.value_or(0.0);
+#ifdef EIGENPOSE_SIM
+  if (axis.endpoint == "simulated")
+    return [options, arm = simulated_arm(options.stage, bench), &clock = bench.clock] {
+      return std::make_unique<AptAxis>(options, std::make_unique<sim::SimLink>(arm->cable, clock), clock);
+    };
+#endif
+  FtdiLinkOptions link;
+  link.serial = usb_serial(axis.endpoint);
+  link.flow_control = FtdiFlowControl::rts_cts;
   return [options, link, &clock = bench.clock] {
     return std::make_unique<AptAxis>(options, std::make_unique<FtdiLink>(link, clock), clock);
   };

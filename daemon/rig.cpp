@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::chrono::milliseconds refresh_period{500};
 constexpr std::chrono::seconds reopen_pause{5};
-constexpr std::chrono::seconds answer_timeout{2};
+/// For opening a device and its first answer. How often it is asked is the driver's own affair.
+constexpr std::chrono::seconds answer_timeout{5};
 
 }  // namespace
 

@@ -34,6 +34,9 @@ struct AxisState {
   std::optional<std::string> alarm;  ///< in words, when the drive raises one
 };
 
+/// How far an axis that does not know where it is may be moved in one go, in its unit.
+double longest_unhomed_jog(const Dof& dof);
+
 /// One motorised DOF. Lives on one thread, except `stop_motion`, which any thread may call at any time.
 ///
 /// Every call that moves: refuses a target outside the range (std::out_of_range) before anything moves;
@@ -57,7 +60,15 @@ class Axis {
   /// elsewhere), DeviceTimeout, DeviceLost; Interrupted.
   virtual double move_to(double position, TimePoint deadline, std::stop_token stop) = 0;
 
-  /// Tells the drive to stop now, and makes a `move_to` or `home` under way on another thread end with
+  /// Moves by `distance` (in the unit) from where the axis stands and waits for arrival: the operator's hand,
+  /// not the acquisition's. Here by `move_to`; a driver whose device moves by a distance itself also moves an
+  /// axis that is not homed, to free it, by `longest_unhomed_jog` at most, since its limits are not known
+  /// then.
+  /// @return the position read back. @throws std::out_of_range when it would end outside the range or turn
+  /// further than the range is long; otherwise like `move_to`.
+  virtual double jog(double distance, TimePoint deadline, std::stop_token stop);
+
+  /// Tells the drive to stop now, and makes a `move_to`, `jog` or `home` under way on another thread end with
   /// Interrupted. Thread-safe, idempotent. @throws DeviceError when the drive cannot be told.
   virtual void stop_motion() = 0;
 

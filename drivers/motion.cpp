@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "drivers/axis.h"
+
 namespace eigenpose {
 
 MotionGate::Passage::Passage(MotionGate& gate, const std::stop_token& caller)
@@ -82,6 +84,18 @@ void check_target(const std::string& device, const Dof& dof, double position) {
   if (!(position >= dof.lower && position <= dof.upper))
     throw std::out_of_range(
         fmt::format("{}: {} {} is outside {} … {}", device, position, dof.unit, dof.lower, dof.upper));
+}
+
+void check_jog(const std::string& device, const Dof& dof, double distance, bool homed) {
+  const double range = dof.upper - dof.lower;
+  if (!(std::abs(distance) <= range))
+    throw std::out_of_range(fmt::format("{}: a jog by {} {} is longer than the range of {} {}", device,
+                                        distance, dof.unit, range, dof.unit));
+  const double longest = longest_unhomed_jog(dof);
+  if (!homed && std::abs(distance) > longest)
+    throw std::out_of_range(fmt::format(
+        "{}: not homed, so its limits are not known: {:g} {} at most in one go; home it first, or jog less",
+        device, longest, dof.unit));
 }
 
 }  // namespace eigenpose

@@ -104,6 +104,10 @@ double nearest_target(const Dof& dof, double position, double from);
 /// included.
 void check_target(const std::string& device, const Dof& dof, double position);
 
+/// @throws std::out_of_range when `distance` is not a number, longer than the range of `dof`, or, for an axis
+/// that is not homed, longer than `longest_unhomed_jog`.
+void check_jog(const std::string& device, const Dof& dof, double distance, bool homed);
+
 /// The same failure with what became of the motor behind its cause.
 template <class Failure>
 [[noreturn]] void rethrow_with(const Failure& failure, const std::string& consequence) {

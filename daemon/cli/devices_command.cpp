@@ -87,6 +87,7 @@ void add_devices_command(CLI::App& app, CommandLine& line) {
       "devices", "List cameras, serial ports and USB devices, as the configuration names them");
   command->add_flag("--details", options->details, "All modes and controls of each camera");
   command->add_flag("--json", options->json, "Print as JSON");
+  command->footer("What is printed as KEY = \"…\" can be copied into the configuration.");
   command->callback([options, &line] {
     line.action = [options] {
       const Inventory found = take_inventory();

@@ -1,6 +1,7 @@
 /// `eigenpose doctor`: checks everything the configuration needs, and names what to do for each fault.
 
 #include <cstdio>
+#include <set>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -31,7 +32,10 @@ class Doctor {
   explicit Doctor(bool json) : json_(json) {}
 
   void report(const Finding& finding) {
-    if (finding.health == Health::fault) ++faults_;
+    if (finding.health == Health::fault) {
+      ++faults_;
+      faulty_.insert(finding.subject);
+    }
     if (finding.health == Health::note) ++notes_;
     if (json_) {
       findings_.push_back({{"health", word(finding.health)},
@@ -44,6 +48,8 @@ class Doctor {
     if (!finding.remedy.empty()) std::printf("       -> %s\n", finding.remedy.c_str());
     std::fflush(stdout);
   }
+
+  [[nodiscard]] bool has_faulted(const std::string& subject) const { return faulty_.contains(subject); }
 
   int finish() {
     if (json_) {
@@ -59,6 +65,7 @@ class Doctor {
   bool json_;
   int faults_ = 0;
   int notes_ = 0;
+  std::set<std::string> faulty_;  ///< subjects
   nlohmann::json findings_ = nlohmann::json::array();
 };
 
@@ -70,7 +77,10 @@ int examine(const RigOptions& rig, bool json, const std::stop_token& stop) {
     config = rig.read();
   } catch (const ConfigError& error) {
     report({Health::fault, "configuration", error.what(),
-            "'eigenposed --check-config --config FILE' says when it is good"});
+            std::filesystem::exists(rig.config)
+                ? "'eigenposed --check-config --config FILE' says when it is good"
+                : "copy the nearest file of config/rigs there and adapt it, or name yours: --config FILE"});
+    check_found({}, take_inventory(), report);
     return doctor.finish();
   }
   report({Health::good, "configuration", config.file.string() + " is good", {}});
@@ -82,7 +92,14 @@ int examine(const RigOptions& rig, bool json, const std::stop_token& stop) {
   }
   const SteadyClock clock;
   try {
-    check_devices(make_devices(config, clock), clock, stop, report);
+    Devices devices = make_devices(config, clock);
+    // A device that is not there or may not be opened has been told already.
+    std::erase_if(devices.axes,
+                  [&](const RigAxis& axis) { return doctor.has_faulted("axis " + axis.options.dof.name); });
+    std::erase_if(devices.lamps,
+                  [&](const RigLamp& lamp) { return doctor.has_faulted("lamp " + lamp.options.name); });
+    if (doctor.has_faulted("camera")) devices.camera = nullptr;
+    check_devices(devices, clock, stop, report);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {

@@ -23,12 +23,16 @@ void add_jog_command(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("jog", "Move one axis by hand, within its limits; Ctrl-C stops it");
   options->rig.add_to(*command);
   command->add_option("AXIS", options->axis, "Its name in the configuration")->required();
-  command->add_option("POSITION", options->position, "Where to, in the axis's unit")->required();
-  command->add_flag("--by", options->relative, "POSITION counts from where the axis stands");
+  command->add_option("POSITION", options->position, "Where to, in the axis's unit (deg, mm)")->required();
+  command->add_flag(
+      "--by", options->relative,
+      "POSITION counts from where the axis stands; an axis that is not homed moves a little at most");
   command->add_flag("--home", options->home_first, "Home it first");
   command->footer(
       "Examples:\n  eigenpose jog table 90              turn the table to 90 degrees\n"
-      "  eigenpose jog light_azimuth -5 --by move the arm back by 5 degrees");
+      "  eigenpose jog light_azimuth -5 --by move the arm back by 5 degrees\n"
+      "Limits are those of the configuration. While eigenposed runs it holds the drives: systemctl stop "
+      "eigenposed.");
   command->callback([options, &line] {
     line.action = [options, &line] {
       const SteadyClock clock;
@@ -51,6 +55,10 @@ void add_home_command(CLI::App& app, CommandLine& line) {
       app.add_subcommand("home", "Home axes, one after the other; Ctrl-C stops the one that moves");
   options->rig.add_to(*command);
   command->add_option("AXIS", options->axes, "Names in the configuration; none: all of them");
+  command->footer(
+      "Examples:\n  eigenpose home          every axis\n  eigenpose home table    the turntable alone\n"
+      "Keep a hand on the emergency stop the first time. While eigenposed runs it holds the drives:\n"
+      "systemctl stop eigenposed.");
   command->callback([options, &line] {
     line.action = [options, &line] {
       const SteadyClock clock;

@@ -28,6 +28,10 @@ void add_lamp_command(CLI::App& app, CommandLine& line) {
   command->add_option("--for", options->seconds, "How long; without it until Ctrl-C")
       ->type_name("SECONDS")
       ->check(CLI::Range(0.0, 86400.0));
+  command->footer(
+      "Examples:\n  eigenpose lamp key 0.5           half bright until Ctrl-C\n"
+      "  eigenpose lamp key 1 --for 10    full for ten seconds\n"
+      "While eigenposed runs it holds the lamps: systemctl stop eigenposed.");
   command->callback([options, &line] {
     line.action = [options, &line] {
       const SteadyClock clock;

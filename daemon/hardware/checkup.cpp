@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <optional>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "drivers/modbus/endpoint.h"
 
 namespace eigenpose {
 namespace {
@@ -97,9 +99,13 @@ void check_node(const Machine& machine, const std::string& subject, const fs::pa
 
 /// "rtu:/dev/ttyUSB0:115200:8E1" → "/dev/ttyUSB0"; nothing for another kind of endpoint.
 std::optional<std::string> port_of(const std::string& endpoint) {
-  constexpr std::string_view scheme = "rtu:";
-  if (!endpoint.starts_with(scheme)) return std::nullopt;
-  return endpoint.substr(scheme.size(), endpoint.find(':', scheme.size()) - scheme.size());
+  if (!endpoint.starts_with("rtu:")) return std::nullopt;
+  try {
+    // Names below /dev/serial/by-path have colons of their own, which the driver's own reader knows.
+    return std::get<ModbusRtuEndpoint>(parse_modbus_endpoint(endpoint)).device;
+  } catch (const std::invalid_argument&) {
+    return std::nullopt;  // a fault of the configuration, which making the devices tells
+  }
 }
 
 /// "usb:SERIAL" → SERIAL; nothing for another kind of endpoint.
@@ -147,6 +153,29 @@ void check_usb(const Machine& machine, const std::string& subject, const std::st
           others.empty()
               ? "plug it in and switch it on; no FTDI device is there"
               : "plug it in and switch it on, or set the endpoint to one that is there: " + others});
+}
+
+/// The service runs as a user of its own, who must be there and in the groups that open its devices.
+void check_service_user(const Machine& machine, const Report& report) {
+  const std::string user = "eigenpose";
+  const auto find = [&](const char* file, const std::string& name) {
+    std::ifstream lines(machine.root / file);
+    for (std::string line; std::getline(lines, line);)
+      if (line.starts_with(name + ":")) return line;
+    return std::string();
+  };
+  if (find("etc/passwd", user).empty()) {
+    report({Health::note, "service user", "there is no user '" + user + "', as whom the service runs",
+            "cp systemd/eigenpose.sysusers /etc/sysusers.d/eigenpose.conf && systemd-sysusers"});
+    return;
+  }
+  for (const char* group : {"video", "dialout"}) {
+    const std::string line = find("etc/group", group);
+    const std::string members = "," + line.substr(line.rfind(':') + 1) + ",";
+    if (!line.empty() && members.find("," + user + ",") == std::string::npos)
+      report({Health::note, "service user", fmt::format("'{}' is not in the group '{}'", user, group),
+              fmt::format("adduser {} {}, then systemctl restart eigenposed", user, group)});
+  }
 }
 
 void check_camera_node(const Machine& machine, const CameraOptions& camera, const Inventory& inventory,
@@ -240,6 +269,13 @@ void check_lamp(const RigLamp& lamp, const Clock& clock, const Report& report) {
   report({Health::good, "lamp " + lamp.options.name, opened->info().model + " answers", {}});
 }
 
+/// A failure in words, without the device's name, which is the finding's subject.
+std::string words_of(const DeviceError& error) {
+  const std::string words = error.what();
+  const std::string name = error.device() + ": ";
+  return words.starts_with(name) ? words.substr(name.size()) : words;
+}
+
 /// Runs one check; a failing device is a finding, not the end.
 template <class Check>
 void guarded(const std::string& subject, const std::stop_token& stop, const Report& report,
@@ -250,10 +286,10 @@ void guarded(const std::string& subject, const std::stop_token& stop, const Repo
   } catch (const Interrupted&) {
     throw;
   } catch (const DeviceLost& lost) {
-    report({Health::fault, subject, lost.what(),
+    report({Health::fault, subject, words_of(lost),
             "see that it is plugged in, switched on, and named rightly in the configuration"});
   } catch (const DeviceTimeout& timeout) {
-    report({Health::fault, subject, timeout.what(),
+    report({Health::fault, subject, words_of(timeout),
             "see that it is switched on, and that address and line settings are the drive's"});
   } catch (const std::exception& error) {
     report({Health::fault, subject, error.what(),
@@ -268,6 +304,7 @@ void check_machine(const Machine& given, const Config& config, const Inventory& 
   const Machine machine = present(given);
   check_folder(config.daemon.runtime_dir, "runtime_dir", report);
   check_folder(config.daemon.state_dir, "state_dir", report);
+  check_service_user(machine, report);
 
   bool needs_rules = false;
   if (config.camera) check_camera_node(machine, *config.camera, inventory, report);
@@ -289,6 +326,22 @@ void check_machine(const Machine& given, const Config& config, const Inventory& 
             "it talks to serial ports when they are plugged in, and may disturb a drive",
             "install the udev rules, which keep it off, or: apt-get remove modemmanager"});
   }
+}
+
+void check_found(const Machine& given, const Inventory& inventory, const Report& report) {
+  const Machine machine = present(given);
+  check_service_user(machine, report);
+  for (const CameraFound& camera : inventory.cameras)
+    if (camera.node.can_capture || camera.node.open_error != 0)
+      check_node(machine, "camera", camera.node.path, camera.node.open_error == 0, report);
+  for (const SerialPortFound& port : inventory.serial_ports)
+    check_node(machine, "serial port", port.path, port.accessible, report);
+  for (const UsbFound& usb : inventory.usb)
+    check_node(machine, "USB " + usb.serial, usb.node, usb.accessible, report);
+  if (!inventory.usb.empty()) check_rules(machine, report);
+  if (inventory.cameras.empty() && inventory.serial_ports.empty() && inventory.usb.empty())
+    report({Health::note, "devices", "no camera, serial port or FTDI chip is plugged in",
+            "none is needed for the simulated lab: sim/demo"});
 }
 
 void check_devices(const Devices& devices, const Clock& clock, const std::stop_token& stop,

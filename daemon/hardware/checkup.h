@@ -43,6 +43,9 @@ struct Machine {
 void check_machine(const Machine& machine, const Config& config, const Inventory& inventory,
                    const Report& report);
 
+/// The same of all that is plugged in, where there is no configuration to say what is needed.
+void check_found(const Machine& machine, const Inventory& inventory, const Report& report);
+
 /// Opens every configured device, one after the other, and listens to what it says: the camera takes
 /// pictures, each drive tells its state, each lamp is told to be dark. Moves nothing. Stops between two
 /// devices on request (throws Interrupted).

@@ -1,6 +1,7 @@
 #include "daemon/hardware/hand_control.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -74,18 +75,25 @@ void HandControl::home(const std::string& axis, std::stop_token stop) {
 double HandControl::jog(const std::string& axis, double position, bool relative, std::stop_token stop) {
   OpenAxis& opened = open(axis);
   const Dof& dof = opened.setup->options.dof;
-  double target = position;
-  if (relative) {
-    const AxisState state = opened.axis->state(clock_.now() + seconds(3));
-    if (!state.homed)
-      throw DeviceError(axis, "jog", "it has not been homed: 'eigenpose home " + axis + "' first");
-    target = dof.canonical(state.position + position);
+  const TimePoint deadline = clock_.now() + opened.setup->options.move_timeout;
+  const auto refuse_outside = [&](double target) {
+    if (!(target >= dof.lower && target <= dof.upper))
+      throw std::out_of_range(fmt::format("{}: {:g} {} is outside {:g} to {:g}; nothing was moved", axis,
+                                          target, dof.unit, dof.lower, dof.upper));
+  };
+  if (!relative) {
+    refuse_outside(position);
+    return opened.axis->move_to(position, deadline, std::move(stop));
   }
-  if (!(target >= dof.lower && target <= dof.upper)) {
-    throw std::out_of_range(fmt::format("{}: {:g} {} is outside {:g} to {:g}; nothing was moved", axis,
-                                        target, dof.unit, dof.lower, dof.upper));
-  }
-  return opened.axis->move_to(target, clock_.now() + opened.setup->options.move_timeout, std::move(stop));
+  const AxisState state = opened.axis->state(clock_.now() + seconds(3));
+  if (state.homed && !dof.periodic) refuse_outside(state.position + position);
+  if (!state.homed && std::abs(position) > longest_unhomed_jog(dof))
+    throw DeviceError(
+        axis, "jog",
+        fmt::format("it has not been homed, so its limits are not known: 'eigenpose home {}' first, or "
+                    "jog it by {:g} {} at most to free it",
+                    axis, longest_unhomed_jog(dof), dof.unit));
+  return opened.axis->jog(position, deadline, std::move(stop));
 }
 
 void HandControl::light(const std::string& lamp, double level) {

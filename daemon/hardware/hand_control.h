@@ -31,7 +31,8 @@ class HandControl {
   /// Homes. Motion ends with Interrupted on `stop`; then, as after any failure, the drive was told to stop.
   void home(const std::string& axis, std::stop_token stop);
 
-  /// Moves to `position`, or by it from where the axis stands. Limits are those of the configuration.
+  /// Moves to `position`, or by it from where the axis stands. Limits are those of the configuration; an axis
+  /// that is not homed does not know them, and is moved a little at most.
   /// @return the position read back. @throws std::out_of_range before anything moves; DeviceError (not homed,
   /// …).
   double jog(const std::string& axis, double position, bool relative, std::stop_token stop);

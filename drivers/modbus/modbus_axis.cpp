@@ -144,8 +144,9 @@ ModbusAxis::Reading ModbusAxis::read(const std::string& operation, TimePoint dea
 }
 
 void ModbusAxis::write(const std::string& operation, const RegisterWrites& writes, const RegisterFill& fill,
-                       TimePoint deadline, bool urgent) {
-  const ModbusCaller caller{options_.name, operation, options_.unit, urgent};
+                       TimePoint deadline, Sending sending) {
+  const ModbusCaller caller{options_.name, operation, options_.unit, sending == Sending::urgent,
+                            sending == Sending::once};
   for (const RegisterWrite& one : writes) {
     std::vector<std::uint16_t> values;
     try {
@@ -165,7 +166,7 @@ AxisState ModbusAxis::state(TimePoint deadline) {
 }
 
 void ModbusAxis::send_stop(TimePoint deadline) {
-  write("stop", profile_.stop, {}, deadline, true);
+  write("stop", profile_.stop, {}, deadline, Sending::urgent);
 }
 
 void ModbusAxis::stop_motion() {
@@ -267,7 +268,7 @@ ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation,
 
 ModbusAxis::Reading ModbusAxis::run(MotionWatch::Goal goal, const std::string& operation,
                                     const RegisterWrites& command, const RegisterFill& fill,
-                                    TimePoint deadline, const std::stop_token& stop) {
+                                    TimePoint deadline, const std::stop_token& stop, Sending sending) {
   const auto motion = [&] {
     MotionWatch watch(options_.name, operation, options_.dof, goal, position_of(fill.position),
                       info_.arrival_tolerance, options_.patience, clock_.now());
@@ -275,7 +276,7 @@ ModbusAxis::Reading ModbusAxis::run(MotionWatch::Goal goal, const std::string& o
     arm_watchdog(operation, deadline);
     if (stop.stop_requested())
       throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
-    write(operation, command, fill, deadline);
+    write(operation, command, fill, deadline, sending);
     for (;;) {
       if (stop.stop_requested())
         throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
@@ -330,6 +331,25 @@ double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token 
   const Reading after =
       run(MotionWatch::Goal::target, operation, profile_.move, fill, deadline, motion.token());
   return options_.dof.canonical(after.position);
+}
+
+double ModbusAxis::jog(double distance, TimePoint deadline, std::stop_token stop) {
+  if (profile_.jog.empty()) return Axis::jog(distance, deadline, std::move(stop));
+  const Dof& dof = options_.dof;
+  check_jog(options_.name, dof, distance, true);
+  const MotionGate::Passage motion(gate_, stop);
+  const std::string operation = fmt::format("jog by {} {}", distance, dof.unit);
+  if (motion.token().stop_requested()) throw Interrupted();
+  const Reading before = read_ready_to_move(operation, false, deadline, motion.token());
+  check_jog(options_.name, dof, distance, before.homed);
+  if (before.homed && !dof.periodic) check_target(options_.name, dof, before.position + distance);
+
+  RegisterFill fill = motion_fill();
+  fill.distance = std::llround((options_.reversed ? -distance : distance) * options_.steps_per_unit);
+  fill.position = before.steps + fill.distance;
+  const Reading after =
+      run(MotionWatch::Goal::target, operation, profile_.jog, fill, deadline, motion.token(), Sending::once);
+  return dof.canonical(after.position);
 }
 
 }  // namespace eigenpose

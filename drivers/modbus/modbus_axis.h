@@ -54,12 +54,19 @@ class ModbusAxis final : public Axis {
   AxisState state(TimePoint deadline) override;
   void home(TimePoint deadline, std::stop_token stop) override;
   double move_to(double position, TimePoint deadline, std::stop_token stop) override;
+  /// By the profile's own jog where it has one; that is sent once only, since twice would be twice as far.
+  double jog(double distance, TimePoint deadline, std::stop_token stop) override;
   void stop_motion() override;
 
  private:
   struct Block {
     std::uint16_t address = 0;
     int count = 0;
+  };
+  enum class Sending {
+    until_answered,  ///< again when the answer is lost
+    urgent,          ///< the same, before all others on the bus
+    once
   };
   struct Reading : MotionReading {
     bool ready = true;
@@ -71,13 +78,14 @@ class ModbusAxis final : public Axis {
   Reading read_ready_to_move(const std::string& operation, bool clear_any_alarm, TimePoint deadline,
                              const std::stop_token& stop);
   void write(const std::string& operation, const RegisterWrites& writes, const RegisterFill& fill,
-             TimePoint deadline, bool urgent = false);
+             TimePoint deadline, Sending sending = Sending::until_answered);
   void clear_alarm(const std::string& operation, TimePoint deadline);
   void set_up_after_connecting(const std::string& operation, TimePoint deadline);
   Reading wait_for_standstill(const std::string& operation, TimePoint deadline);
   /// Sends `command` and waits. On every way but arrival the drive has been told to stop.
   Reading run(MotionWatch::Goal goal, const std::string& operation, const RegisterWrites& command,
-              const RegisterFill& fill, TimePoint deadline, const std::stop_token& stop);
+              const RegisterFill& fill, TimePoint deadline, const std::stop_token& stop,
+              Sending sending = Sending::until_answered);
   /// Tries to stop after a failure; never throws. Says in words how it went.
   std::string stop_after_failure();
   void send_stop(TimePoint deadline);

@@ -12,6 +12,7 @@
 /// Served in full: direct data operation, STOP, FREE, ZHOME, ALM-RST, FW-POS/RV-POS, P-PRESET, alarm reset,
 /// communication timeout. Stored operation data (M0…M2 with START) is not.
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -72,6 +73,8 @@ class AzDrive {
   /// What happens by itself: watchdog, deviation, limits. Call it at least every 20 ms.
   void tick();
 
+  /// From the next motion on, in place of the constructor's.
+  void set_speed_factor(double factor) { speed_factor_ = factor; }
   void set_faults(const DriveFaults& faults);
   [[nodiscard]] DriveFaults faults() const;
   void raise_alarm(int code);
@@ -97,7 +100,7 @@ class AzDrive {
 
   SimLab& lab_;
   const DriveOptions options_;
-  const double speed_factor_;
+  std::atomic<double> speed_factor_;
   mutable std::mutex mutex_;
   // Everything below is guarded by mutex_.
   std::map<std::uint16_t, std::uint16_t> registers_;  ///< those that keep what is written

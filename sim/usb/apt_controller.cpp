@@ -29,6 +29,7 @@ void append(std::vector<std::uint8_t>& bytes, std::uint32_t value, std::size_t c
 AptController::AptController(SimLab& lab, AptControllerOptions options)
     : lab_(lab),
       options_(std::move(options)),
+      speed_factor_(options_.speed_factor),
       motion_(Trajectory::standstill(
           (lab.axis_position_deg(options_.axis, lab.clock().now()) - options_.home_deg) *
               options_.counts_per_degree,
@@ -157,7 +158,7 @@ void AptController::follow(const Trajectory& counts) {
 }
 
 void AptController::move_to_counts(double counts, double degrees_per_s, TimePoint now) {
-  const double f = options_.speed_factor;
+  const double f = speed_factor_;
   const double scale = options_.counts_per_degree;
   const MotionLimits limits{degrees_per_s * scale * f, acceleration_ * scale * f * f,
                             acceleration_ * scale * f * f};
@@ -169,7 +170,7 @@ void AptController::move_to_counts(double counts, double degrees_per_s, TimePoin
 }
 
 void AptController::stop(bool at_once, TimePoint now) {
-  const double f = options_.speed_factor;
+  const double f = speed_factor_;
   follow(at_once ? motion_.freeze(now)
                  : motion_.stop(acceleration_ * options_.counts_per_degree * f * f, now));
   homing_ = false;

@@ -4,6 +4,7 @@
 /// Controllers Host-Controller Communications Protocol", apart from any driver.
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -46,6 +47,8 @@ class AptController final : public ByteDevice {
 
   [[nodiscard]] const AptControllerOptions& options() const { return options_; }
   void set_faults(const AptFaults& faults);
+  /// From the next motion on, in place of the option.
+  void set_speed_factor(double factor) { speed_factor_ = factor; }
   /// A fault in the controller, told with words as it happens and by the motion error bit until the next
   /// command.
   void raise_fault(const std::string& words);
@@ -67,6 +70,7 @@ class AptController final : public ByteDevice {
 
   SimLab& lab_;
   const AptControllerOptions options_;
+  std::atomic<double> speed_factor_;
   mutable std::mutex mutex_;
   // Everything below is guarded by mutex_.
   std::vector<std::uint8_t> heard_;

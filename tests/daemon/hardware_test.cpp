@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "daemon/hardware/checkup.h"
 #include "daemon/hardware/hand_control.h"
+#include "tests/daemon/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -107,13 +108,43 @@ TEST_F(HandControlTest, WantsAnAxisHomedBeforeItJogsByADistance) {
   elevation_.homed = false;
   HandControl control = hands();
   try {
-    control.jog("elevation", 1.0, true, {});
+    control.jog("elevation", 5.0, true, {});
     FAIL();
   } catch (const DeviceError& error) {
     EXPECT_THAT(error.what(), HasSubstr("eigenpose home elevation"));
+    EXPECT_THAT(error.what(), HasSubstr("2.5 deg at most"));
   }
+  EXPECT_THROW(control.jog("elevation", 1.0, true, {}), DeviceError) << "this driver only knows positions";
   control.home("elevation", {});
   EXPECT_DOUBLE_EQ(control.jog("elevation", 1.0, true, {}), 1.0);
+}
+
+TEST(HandControlInTheSimulatedLab, TurnsAnArmOnAnAptStageByPositionAndByDistance) {
+  const TemporaryFolder folder;
+  const Config config = parse_config(R"(
+[daemon]
+runtime_dir = "run"
+[sim]
+speed_factor = 100.0
+[[axis]]
+name = "arm"
+driver = "apt"
+stage = "PRM1-Z8"
+endpoint = "simulated"
+periodic = false
+lower = -90.0
+upper = 90.0
+)",
+                                     folder.path() / "rig.toml");
+  fs::create_directories(config.daemon.runtime_dir);
+  const SteadyClock clock;
+  HandControl control(config, clock);
+  EXPECT_THROW(control.jog("arm", 10.0, false, {}), DeviceError) << "not homed";
+  control.home("arm", {});
+  EXPECT_NEAR(control.jog("arm", 30.0, false, {}), 30.0, 0.05);
+  EXPECT_NEAR(control.jog("arm", -45.0, true, {}), -15.0, 0.05);
+  EXPECT_THROW(control.jog("arm", -80.0, true, {}), std::out_of_range);
+  EXPECT_NEAR(control.state("arm").position, -15.0, 0.05);
 }
 
 TEST_F(HandControlTest, NamesTheAxesThereAreWhenAskedForAnother) {
@@ -224,6 +255,32 @@ TEST_F(CheckupTest, MissesTheUdevRulesOnlyWhereUsbIsUsed) {
   EXPECT_THAT(on("udev rules")[0].remedy, HasSubstr("udevadm"));
   put("etc/udev/rules.d/60-eigenpose.rules", "");
   EXPECT_EQ(on("udev rules")[0].health, Health::good);
+}
+
+TEST_F(CheckupTest, FindsAPortWhoseNameHasColonsOfItsOwn) {
+  const std::string port = "/dev/serial/by-path/pci-0000:00:14.0-usb-0:1:1.0-port0";
+  put(port.substr(1), "");
+  add_axis("rtu:" + port + ":115200:8E1");
+  const auto arm = on("axis arm");
+  ASSERT_FALSE(arm.empty());
+  EXPECT_EQ(arm[0].health, Health::good) << arm[0].what;
+}
+
+TEST_F(CheckupTest, MissesTheServicesUserAndItsGroups) {
+  EXPECT_THAT(on("service user").at(0).remedy, HasSubstr("systemd-sysusers"));
+  put("etc/passwd", "root:x:0:0::/root:/bin/sh\neigenpose:x:990:990::/var/lib/eigenpose:/usr/sbin/nologin");
+  put("etc/group", "video:x:44:lab,eigenpose\ndialout:x:20:lab");
+  const auto found = on("service user");
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].what, HasSubstr("'dialout'"));
+}
+
+TEST_F(CheckupTest, LooksAtWhatIsPluggedInWhereThereIsNoConfiguration) {
+  plug_in_stage();
+  std::vector<std::string> subjects;
+  check_found(machine_, take_inventory(root_),
+              [&](const Finding& finding) { subjects.push_back(finding.subject); });
+  EXPECT_THAT(subjects, testing::ElementsAre("service user", "USB 83123456", "udev rules"));
 }
 
 TEST_F(CheckupTest, ListsTheSerialPortsThereAreWhenTheConfiguredOneIsNot) {

@@ -58,6 +58,7 @@ class AptRig final : public AxisRig {
     return lab_.axis_position_deg(sim::LabAxis::arm_azimuth, now) !=
            lab_.axis_position_deg(sim::LabAxis::arm_azimuth, now - 2ms);
   }
+  void slow_down(bool slow) override { controller_.set_speed_factor(slow ? 3.0 : 30.0); }
   void silence(bool silent) override { cable_.silence(silent); }
   void unplug() override { cable_.unplug(); }
   void plug_in() override { cable_.plug_in(); }

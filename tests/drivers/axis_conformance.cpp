@@ -131,6 +131,43 @@ TEST_P(AxisConformance, MovesNowhereWhenItIsThereAlready) {
   EXPECT_LE(std::abs(difference(rig().true_position(), before)), tolerance());
 }
 
+TEST_P(AxisConformance, JogsByADistanceFromWhereItStands) {
+  home();
+  axis().move_to(at(0.3), soon(), {});
+  const double range = axis().info().dof.upper - axis().info().dof.lower;
+  for (const double distance : {0.02 * range, -0.01 * range}) {
+    // A line that spoils requests may spoil a jog, which is sent once only: a failure, and never twice the
+    // distance.
+    bool done = false;
+    for (int attempt = 0; attempt < 10 && !done; ++attempt) {
+      const double before = rig().true_position();
+      try {
+        const double reported = axis().jog(distance, soon(), {});
+        EXPECT_LE(std::abs(difference(rig().true_position(), before) - distance), tolerance());
+        EXPECT_LE(std::abs(difference(reported, rig().true_position())), tolerance());
+        done = true;
+      } catch (const DeviceError&) {
+        EXPECT_LE(std::abs(difference(rig().true_position(), before)), std::abs(distance) + tolerance());
+      }
+    }
+    EXPECT_TRUE(done) << "distance " << distance;
+  }
+}
+
+TEST_P(AxisConformance, RefusesToJogBeyondItsRange) {
+  home();
+  const Dof dof = axis().info().dof;
+  const double before = rig().true_position();
+  std::vector<double> distances = {1.01 * (dof.upper - dof.lower), std::numeric_limits<double>::quiet_NaN(),
+                                   -std::numeric_limits<double>::infinity()};
+  if (!dof.periodic) distances.push_back(dof.lower - axis().state(soon()).position - 1.0);
+  for (const double distance : distances) {
+    EXPECT_THROW(axis().jog(distance, soon(), {}), std::out_of_range) << distance;
+    EXPECT_FALSE(rig().truly_moving());
+  }
+  EXPECT_EQ(rig().true_position(), before);
+}
+
 TEST_P(AxisConformance, GoesTheShortWayRound) {
   if (!axis().info().dof.periodic) GTEST_SKIP() << "this axis does not close on itself";
   home();
@@ -163,6 +200,7 @@ TEST_P(AxisConformance, DoesNotBeginWhenTheStopIsRequestedAlready) {
 
 TEST_P(AxisConformance, StopsInTheMiddleOfAMoveOnRequest) {
   home();
+  rig().slow_down(true);
   const double target = at(0.45);
   Background move([&](const std::stop_token& stop) { axis().move_to(target, soon(), stop); });
   ASSERT_TRUE(eventually([&] { return rig().truly_moving(); }));
@@ -174,6 +212,7 @@ TEST_P(AxisConformance, StopsInTheMiddleOfAMoveOnRequest) {
 
 TEST_P(AxisConformance, IsStoppedByAnotherThread) {
   home();
+  rig().slow_down(true);
   const double target = at(0.45);
   Background move([&](const std::stop_token& stop) { axis().move_to(target, soon(), stop); });
   ASSERT_TRUE(eventually([&] { return rig().truly_moving(); }));
@@ -193,6 +232,7 @@ TEST_P(AxisConformance, MovesAgainAfterItWasStopped) {
 
 TEST_P(AxisConformance, StopsWhenTheDeadlineComesBeforeTheEnd) {
   home();
+  rig().slow_down(true);
   const double target = at(0.49);
   EXPECT_THROW(axis().move_to(target, std::chrono::steady_clock::now() + 100ms, {}), DeviceTimeout);
   EXPECT_TRUE(eventually([&] { return !rig().truly_moving(); }));
@@ -238,11 +278,13 @@ TEST_P(AxisConformance, FindsADeviceAgainThatWasAway) {
 
 TEST_P(AxisConformance, FailsWhenTheDeviceGoesAwayInTheMiddleOfAMove) {
   home();
+  rig().slow_down(true);
   Background move([&](const std::stop_token& stop) { axis().move_to(at(0.45), soon(), stop); });
   ASSERT_TRUE(eventually([&] { return rig().truly_moving(); }));
   rig().unplug();
   EXPECT_THROW(move.finish(), DeviceError);
   rig().plug_in();
+  rig().slow_down(false);
   home();
   axis().move_to(at(0.2), soon(), {});
   EXPECT_LE(std::abs(difference(rig().true_position(), at(0.2))), tolerance());
@@ -251,21 +293,25 @@ TEST_P(AxisConformance, FailsWhenTheDeviceGoesAwayInTheMiddleOfAMove) {
 TEST_P(AxisConformance, FailsWhenTheDeviceGoesAwayWhileHoming) {
   home();
   axis().move_to(at(0.45), soon(), {});
+  rig().slow_down(true);
   Background homing([&](const std::stop_token& stop) { axis().home(soon(), stop); });
   ASSERT_TRUE(eventually([&] { return rig().truly_moving(); }));
   rig().unplug();
   EXPECT_THROW(homing.finish(), DeviceError);
   rig().plug_in();
+  rig().slow_down(false);
   home();
 }
 
 TEST_P(AxisConformance, FailsWhenTheDeviceFallsSilentInTheMiddleOfAMove) {
   home();
+  rig().slow_down(true);
   Background move([&](const std::stop_token& stop) { axis().move_to(at(0.45), soon(), stop); });
   ASSERT_TRUE(eventually([&] { return rig().truly_moving(); }));
   rig().silence(true);
   EXPECT_THROW(move.finish(), DeviceError);
   rig().silence(false);
+  rig().slow_down(false);
   home();
   axis().move_to(at(0.2), soon(), {});
   EXPECT_LE(std::abs(difference(rig().true_position(), at(0.2))), tolerance());
@@ -307,6 +353,7 @@ TEST_P(AxisConformance, SaysAnAlarmInWordsAndDoesNotMoveUntilHomed) {
 
 TEST_P(AxisConformance, StopsAMotorThatRunsOnWhenItIsDestroyed) {
   home();
+  rig().slow_down(true);
   Background move([&](const std::stop_token& stop) { axis().move_to(at(0.49), soon(), stop); });
   ASSERT_TRUE(eventually([&] { return rig().truly_moving(); }));
   rig().silence(true);

@@ -33,6 +33,8 @@ class AxisRig {
   [[nodiscard]] virtual double true_position() = 0;
   [[nodiscard]] virtual bool truly_moving() = 0;
 
+  /// Ten times as slow, so that whoever interrupts a motion comes in time on a loaded machine too.
+  virtual void slow_down(bool slow) = 0;
   virtual void silence(bool silent) = 0;  ///< hears nothing and says nothing
   virtual void unplug() = 0;              ///< gone from the bus; its power stays
   virtual void plug_in() = 0;

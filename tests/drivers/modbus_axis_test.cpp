@@ -116,6 +116,33 @@ TEST_F(ModbusAxisTest, ReversedAxesAndOffsetsAreHeeded) {
   EXPECT_NEAR(rig_.true_position(), 320.0, 0.05) << "30 + 10 the other way";
 }
 
+TEST_F(ModbusAxisTest, AnAxisThatIsNotHomedJogsALittleToBeFreed) {
+  const double before = rig_.true_position();
+  rig_.axis().jog(-4.0, soon(), {});
+  EXPECT_NEAR(circular_difference(rig_.true_position(), before, 360.0), -4.0, 0.05);
+  EXPECT_THAT(failure_of([&] { rig_.axis().jog(11.0, soon(), {}); }), HasSubstr("10 deg at most"));
+  EXPECT_NEAR(circular_difference(rig_.true_position(), before, 360.0), -4.0, 0.05);
+}
+
+TEST_F(ModbusAxisTest, AJogIsNeverDoneTwiceWhicheverAnswerIsLost) {
+  rig_.axis().home(soon(), {});
+  int failures = 0;
+  for (int answered = 0; answered < 12; ++answered) {
+    const double before = rig_.true_position();
+    rig_.faults().add({WireFaultKind::none}, answered);
+    rig_.faults().add({WireFaultKind::silence});
+    try {
+      rig_.axis().jog(3.0, soon(), {});
+      EXPECT_NEAR(circular_difference(rig_.true_position(), before, 360.0), 3.0, 0.05) << answered;
+    } catch (const DeviceError&) {
+      ++failures;
+      EXPECT_LT(circular_difference(rig_.true_position(), before, 360.0), 3.05) << answered;
+    }
+    rig_.faults().clear();
+  }
+  EXPECT_EQ(failures, 1) << "the jog's own";
+}
+
 TEST_F(ModbusAxisTest, SeveralAxesShareOneBus) {
   SteadyClock clock;
   ModbusAxisOptions options = rig_.options();

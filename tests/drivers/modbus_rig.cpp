@@ -15,7 +15,6 @@ using namespace std::chrono_literals;
 using sim::WireFault;
 using sim::WireFaultKind;
 
-constexpr double quick = 30.0;  // a table of 30 deg/s and 60 deg/s² crosses a half turn in 0.2 s
 constexpr std::uint64_t seed = 11;
 
 std::filesystem::path new_folder() {

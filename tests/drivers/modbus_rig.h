@@ -29,6 +29,9 @@ constexpr std::chrono::milliseconds rig_response_timeout{40};
 std::vector<sim::WireFault> survivable_faults(
     ModbusLine line, std::chrono::milliseconds response_timeout = rig_response_timeout);
 
+/// A table of 30 deg/s and 60 deg/s² that is so much faster crosses a half turn in 0.2 s.
+constexpr double quick = 30.0;
+
 class ModbusRig final : public AxisRig {
  public:
   /// @param fault_rate of all requests, meets one of `survivable_faults`.
@@ -41,6 +44,7 @@ class ModbusRig final : public AxisRig {
   void discard_axis() override { axis_.reset(); }
   double true_position() override;
   bool truly_moving() override;
+  void slow_down(bool slow) override { drive().set_speed_factor(slow ? quick / 10.0 : quick); }
   void silence(bool silent) override;
   void unplug() override;
   void plug_in() override;

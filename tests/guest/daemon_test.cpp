@@ -1,12 +1,15 @@
-// The whole service on real kernel devices: vivid looped with our own pictures as camera, a turntable over
-// Modbus TCP, a stage behind an FTDI chip through libusb. Runs in the guest.
+// The whole service on real kernel devices: vivid looped with our own pictures as camera; a turntable over
+// Modbus, by TCP or by an FTDI chip's kernel tty; a stage behind an FTDI chip through libusb. Runs in the
+// guest.
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <optional>
+#include <functional>
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
@@ -14,15 +17,17 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include "core/image/image_set.h"
 #include "daemon/client/api_client.h"
 #include "sim/lab/sim_lab.h"
 #include "sim/modbus/modbus_server.h"
+#include "sim/modbus/rtu_server.h"
 #include "sim/usb/apt_controller.h"
+#include "tests/guest/far_end.h"
 #include "tests/guest/looped_pictures.h"
+#include "tests/guest/usb_chip.h"
 
 extern char** environ;
 
@@ -67,60 +72,6 @@ class Service {
   pid_t process_ = 0;
 };
 
-/// A simulated stage's controller at the far end of the emulated FTDI chip, which is the guest's second
-/// serial port.
-class StageOnTheCable {
- public:
-  explicit StageOnTheCable(sim::SimLab& lab) : controller_(lab, quick_stage()) {
-    descriptor_ = open("/dev/ttyS1", O_RDWR | O_NOCTTY | O_CLOEXEC);
-    if (descriptor_ < 0) throw std::runtime_error("/dev/ttyS1: is the guest run with --ftdi?");
-    termios line{};
-    cfmakeraw(&line);
-    line.c_cflag |= CLOCAL | CREAD;
-    line.c_cc[VMIN] = 0;
-    line.c_cc[VTIME] = 1;
-    cfsetspeed(&line, B115200);
-    tcsetattr(descriptor_, TCSANOW, &line);
-    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
-  }
-  ~StageOnTheCable() {
-    thread_ = {};
-    close(descriptor_);
-  }
-  StageOnTheCable(const StageOnTheCable&) = delete;
-  StageOnTheCable& operator=(const StageOnTheCable&) = delete;
-
- private:
-  static sim::AptControllerOptions quick_stage() {
-    sim::AptControllerOptions options;
-    options.speed_factor = faster;
-    return options;
-  }
-
-  void serve(const std::stop_token& stop) {
-    std::array<std::uint8_t, 256> bytes{};
-    while (!stop.stop_requested()) {
-      pollfd waits{descriptor_, POLLIN, 0};
-      if (poll(&waits, 1, 20) > 0) {
-        const ssize_t count = read(descriptor_, bytes.data(), bytes.size());
-        if (count > 0) say(controller_.receive({bytes.data(), static_cast<std::size_t>(count)}));
-      }
-      say(controller_.spontaneous());
-    }
-  }
-  void say(const std::vector<std::uint8_t>& bytes) {
-    for (std::size_t sent = 0; sent < bytes.size();) {
-      const ssize_t count = write(descriptor_, bytes.data() + sent, bytes.size() - sent);
-      if (count <= 0) return;  // nobody listens at the other end: an unplugged chip
-      sent += static_cast<std::size_t>(count);
-    }
-  }
-
-  sim::AptController controller_;
-  int descriptor_ = -1;
-  std::jthread thread_;
-};
-
 /// The plug of the emulated FTDI chip, pulled through QEMU's monitor.
 class UsbPlug {
  public:
@@ -140,8 +91,11 @@ class UsbPlug {
          R"("always-plugged":true,"serial":")" +
          serial_ + R"("}})");
   }
-  /// The chip's serial number, from the system; empty while it is unplugged.
-  static std::string serial() {
+  [[nodiscard]] const std::string& serial() const { return serial_; }
+
+ private:
+  /// From the system: the only chip that is plugged in when this is made.
+  static std::string find_serial() {
     for (const auto& entry : fs::directory_iterator("/sys/bus/usb/devices")) {
       std::string vendor, serial;
       std::ifstream(entry.path() / "idVendor") >> vendor;
@@ -150,8 +104,6 @@ class UsbPlug {
     }
     return {};
   }
-
- private:
   void tell(const std::string& line) {
     const std::string command = line + "\n";
     if (write(monitor_, command.data(), command.size()) < 0)
@@ -162,18 +114,15 @@ class UsbPlug {
     }
   }
   const int monitor_;
-  const std::string serial_ = serial();
+  const std::string serial_ = find_serial();
 };
 
+/// The service, its camera, and the lab that both rigs below turn.
 class DaemonInTheGuest : public testing::Test {
  protected:
-  DaemonInTheGuest()
-      : lab_(clock_, {}),
-        drives_(lab_, {.speed_factor = faster}),
-        stage_(lab_),
-        pictures_([this](cv::Mat& luma) { draw(luma); }) {
+  DaemonInTheGuest() : lab_(clock_, {}), pictures_([this](cv::Mat& luma) { draw(luma); }) {
+    fs::remove_all(folder_);
     fs::create_directories(folder_);
-    std::ofstream(folder_ / "rig.toml") << config();
   }
 
   /// What the camera sees: a square whose brightness tells the table's angle, and a bar whose brightness
@@ -186,31 +135,31 @@ class DaemonInTheGuest : public testing::Test {
     luma(cv::Rect(400, 150, 80, 160)) = luma_of(arm + 90.0);
   }
 
-  std::string config() const {
-    return R"(
+  /// The rig's file, with its two axes where `table` and `arm` say.
+  fs::path configured(const std::string& table, const std::string& arm) const {
+    std::ofstream(folder_ / "rig.toml") << R"(
 [daemon]
-runtime_dir = ")" +
-           (folder_ / "run").string() + R"("
-state_dir = ")" +
-           (folder_ / "state").string() + R"("
+runtime_dir = ")" << (folder_ / "run").string()
+                                        << R"("
+state_dir = ")" << (folder_ / "state").string()
+                                        << R"("
 [camera]
 driver = "v4l2"
 bus_path = "platform:vivid-000"
+input = 3
 format = "YUYV"
 color = false
 [[axis]]
 name = "table"
 driver = "modbus"
-endpoint = "tcp://127.0.0.1:)" +
-           std::to_string(drives_.port()) + R"("
+endpoint = ")" << table << R"("
 station = 1
 settle_ms = 600
 [[axis]]
 name = "arm"
 driver = "apt"
 stage = "PRM1-Z8"
-endpoint = "usb:)" +
-           UsbPlug::serial() + R"("
+endpoint = ")" << arm << R"("
 periodic = false
 lower = -90.0
 upper = 90.0
@@ -228,6 +177,7 @@ count = 3
 [watch]
 enabled = false
 )";
+    return folder_ / "rig.toml";
   }
 
   /// The control socket, once it answers.
@@ -262,6 +212,19 @@ enabled = false
     }
   }
 
+  /// Waits until every axis has answered.
+  void wait_for_axes(const ApiClient& api) {
+    nlohmann::json axes;
+    for (int i = 0; i < 600; ++i) {
+      axes = api.get("/v1/status").at("axes");
+      if (std::none_of(axes.begin(), axes.end(),
+                       [](const auto& axis) { return axis.at("position").is_null(); }))
+        return;
+      clock_.sleep_for(100ms);
+    }
+    FAIL() << axes.dump();
+  }
+
   std::string start(const ApiClient& api, const std::string& object) {
     return api.post("/v1/acquisitions", {{"object", object}, {"plan", "default"}})
         .at("id")
@@ -279,17 +242,55 @@ enabled = false
     FAIL() << "the job takes no views";
   }
 
+  /// An acquisition in the middle of which an axis goes away: it fails and names the axis; once that is back,
+  /// the same command takes the rest.
+  void expect_completed_after_loss(const ApiClient& api, const std::string& object, const std::string& axis,
+                                   const std::function<void()>& pull, const std::function<void()>& put_back) {
+    wait_for_axes(api);
+    const std::string job = start(api, object);
+    wait_for_views(api, job, 2);
+    pull();
+    try {
+      api.wait_for_job(job);
+      ADD_FAILURE() << "no failure although " << axis << " is away";
+    } catch (const ApiError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(axis + ": "));
+    }
+    put_back();
+    bool done = false;
+    std::string trouble;
+    for (int attempt = 0; attempt < 20 && !done; ++attempt) {
+      try {
+        api.wait_for_job(start(api, object));
+        done = true;
+      } catch (const ApiError& error) {
+        trouble = error.what();
+        clock_.sleep_for(1s);
+      }
+    }
+    EXPECT_TRUE(done) << trouble;
+    check_views(object);
+  }
+
+  static sim::AptControllerOptions quick_stage() {
+    sim::AptControllerOptions options;
+    options.speed_factor = faster;
+    return options;
+  }
+
   const fs::path folder_ = "/run/rig";
   SteadyClock clock_;
   sim::SimLab lab_;
-  sim::SimModbusServer drives_;
-  StageOnTheCable stage_;
   UsbPlug plug_;
   LoopedPictures pictures_;
 };
 
-TEST_F(DaemonInTheGuest, AcquiresAndAcquiresAgainWithCameraAndUsbUnpluggedInTheMiddle) {
-  const Service service(folder_ / "rig.toml");
+TEST_F(DaemonInTheGuest, AcquiresAgainAfterCameraAndArmWereUnpluggedWithTheTableOnTcp) {
+  sim::SimModbusServer drives(lab_, {.speed_factor = faster});
+  sim::AptController stage(lab_, quick_stage());
+  const FarEnd cable(stage);
+  const Service service(
+      configured("tcp://127.0.0.1:" + std::to_string(drives.port()), "usb:" + plug_.serial()));
   const ApiClient api = client();
 
   api.wait_for_job(start(api, "first"));
@@ -302,25 +303,29 @@ TEST_F(DaemonInTheGuest, AcquiresAndAcquiresAgainWithCameraAndUsbUnpluggedInTheM
   check_views("second");
   EXPECT_GE(api.get("/v1/status").at("camera").at("times_lost").get<int>(), 1);
 
-  // Without the arm the acquisition fails and says so; once it is back, the rest is taken.
-  const std::string third = start(api, "third");
-  wait_for_views(api, third, 2);
-  plug_.pull();
-  EXPECT_THROW(api.wait_for_job(third), ApiError);
-  plug_.put_back();
-  bool done = false;
-  std::string trouble;
-  for (int attempt = 0; attempt < 20 && !done; ++attempt) {
-    try {
-      api.wait_for_job(start(api, "third"));
-      done = true;
-    } catch (const ApiError& error) {
-      trouble = error.what();
-      clock_.sleep_for(1s);
-    }
-  }
-  EXPECT_TRUE(done) << trouble;
-  check_views("third");
+  expect_completed_after_loss(
+      api, "third", "arm", [this] { plug_.pull(); }, [this] { plug_.put_back(); });
+}
+
+TEST_F(DaemonInTheGuest, AcquiresAgainAfterTableAndArmWereUnpluggedWithTheTableOnTheKernelsTty) {
+  const fs::path line = folder_ / "line";
+  sim::SimRtuServer drives(lab_, {.port = line, .speed_factor = faster});
+  Terminal terminal(line);
+  const FarEnd cable(terminal);
+  sim::AptController stage(lab_, quick_stage());
+  UsbChip arm("EP000001");
+  arm.wire(&stage);
+  arm.plug_in();
+  const std::string tty = "/dev/serial/by-id/usb-QEMU_QEMU_USB_SERIAL_" + plug_.serial() + "-if00-port0";
+  for (int i = 0; i < 300 && !fs::exists(tty); ++i) clock_.sleep_for(100ms);
+  ASSERT_TRUE(fs::exists(tty)) << tty;
+  const Service service(configured("rtu:" + tty + ":115200:8E1", "usb:" + arm.serial()));
+  const ApiClient api = client();
+
+  expect_completed_after_loss(
+      api, "first", "table", [this] { plug_.pull(); }, [this] { plug_.put_back(); });
+  expect_completed_after_loss(
+      api, "second", "arm", [&] { arm.unplug(); }, [&] { arm.plug_in(); });
 }
 
 }  // namespace

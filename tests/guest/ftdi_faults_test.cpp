@@ -178,7 +178,7 @@ TEST_F(FtdiFaults, AChipThatVanishesInTheMiddleOfAnAnswerGivesWhatItSaidAndIsLos
 /// An APT stage of which nothing is imitated but the chip and what stands behind it.
 class UsbAptRig final : public AxisRig {
  public:
-  UsbAptRig() : lab_(clock_), controller_(lab_, quick()), socket_(controller_) {
+  UsbAptRig() : lab_(clock_), controller_(lab_, quick_stage()), socket_(controller_) {
     AptAxisOptions options;
     options.stage = apt_stage("PRM1-Z8");
     options.speed = 30.0;
@@ -203,6 +203,7 @@ class UsbAptRig final : public AxisRig {
     return lab_.axis_position_deg(sim::LabAxis::arm_azimuth, now) !=
            lab_.axis_position_deg(sim::LabAxis::arm_azimuth, now - 2ms);
   }
+  void slow_down(bool slow) override { controller_.set_speed_factor(slow ? 0.2 * quick : quick); }
   void silence(bool silent) override { chip().set_faults({.silent = silent}); }
   void unplug() override { chip().unplug(); }
   void plug_in() override {
@@ -214,10 +215,10 @@ class UsbAptRig final : public AxisRig {
   void raise_alarm() override { controller_.raise_fault("over temperature"); }
 
  private:
-  /// Half a turn takes half a second: long enough that a loaded machine still stops it on the way.
-  static sim::AptControllerOptions quick() {
+  static constexpr double quick = 12.0;  ///< half a turn takes half a second
+  static sim::AptControllerOptions quick_stage() {
     sim::AptControllerOptions options;
-    options.speed_factor = 12.0;
+    options.speed_factor = quick;
     return options;
   }
 
