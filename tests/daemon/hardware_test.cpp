@@ -11,7 +11,7 @@
 #include "core/base/error.h"
 #include "daemon/hardware/checkup.h"
 #include "daemon/hardware/hand_control.h"
-#include "tests/daemon/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -120,7 +120,7 @@ TEST_F(HandControlTest, WantsAnAxisHomedBeforeItJogsByADistance) {
 }
 
 TEST(HandControlInTheSimulatedLab, TurnsAnArmOnAnAptStageByPositionAndByDistance) {
-  const TemporaryFolder folder;
+  const test::TemporaryFolder folder;
   const Config config = parse_config(R"(
 [daemon]
 runtime_dir = "run"
