@@ -81,10 +81,13 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
   group.write("query_step", static_cast<double>(parts.scale.query));
   group.write("noise", parts.noise);
   group.write("smallest_rate", parts.smallest_rate);
+  group.write("sure_ratio", parts.sure_ratio);
   const Hdf5Group objects = group.make_group("objects");
   for (std::size_t o = 0; o < parts.objects.size(); ++o) {
     const Hdf5Group object = objects.make_group(numbered(o));
     write_windows(object, parts.objects[o]);
+    object.write("rejection_distance", parts.calibration[o].rejection_distance);
+    object.write("typical_distance", parts.calibration[o].typical_distance);
     object.write("rejection_score", parts.calibration[o].rejection_score);
     object.write("typical_score", parts.calibration[o].typical_score);
     object.write("covered_share", parts.calibration[o].covered_share);
@@ -114,10 +117,13 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
                  static_cast<float>(group.read_double("query_step"))};
   parts.noise = group.read_double("noise");
   parts.smallest_rate = group.read_double("smallest_rate");
+  parts.sure_ratio = group.read_double("sure_ratio");
   for (std::size_t o = 0; o < names.size(); ++o) {
     const Hdf5Group object = stored.open_group(names[o]);
     parts.objects.push_back(read_windows(object, parts.scale));
     PartsCalibration calibration;
+    calibration.rejection_distance = object.read_double("rejection_distance");
+    calibration.typical_distance = object.read_double("typical_distance");
     calibration.rejection_score = object.read_double("rejection_score");
     calibration.typical_score = object.read_double("typical_score");
     calibration.covered_share = object.read_double("covered_share");

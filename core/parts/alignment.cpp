@@ -193,6 +193,10 @@ const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, c
                     [this](std::size_t a, std::size_t b) { return costs_[a] < costs_[b]; });
   poses_.clear();
   for (std::size_t i = 0; i < starts; ++i) {
+    // What begins this much worse does not end best.
+    if (costs_[minima_[i]] > 2.0 * costs_[minima_[0]] + options_.hopeless * options_.noise) {
+      break;
+    }
     AlignedPose pose;
     follow(picture, space, minima_[i], pose);
     const bool known = std::any_of(poses_.begin(), poses_.end(), [&](const AlignedPose& other) {

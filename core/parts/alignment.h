@@ -30,9 +30,11 @@ struct AlignmentPrior {
 
 struct AlignmentOptions {
   AlignmentPrior prior;
-  double noise = 1e-4;        ///< ν, squared length between unit-energy appearances
-  int starts = 6;             ///< minima over the pose that are followed
-  int rounds = 6;             ///< Gauss–Newton rounds each
+  double noise = 1e-4;  ///< ν, squared length between unit-energy appearances
+  int starts = 6;       ///< minima over the pose that are followed
+  double hopeless =
+      60.0;        ///< minima higher than twice the deepest by more than this times ν are not followed
+  int rounds = 6;  ///< Gauss–Newton rounds each
   double reach = 20.0 / 360;  ///< how far a round may move the pose, as a share of a periodic DOF's range
   bool fine = true;           ///< compare the ends at the fine scale
 };

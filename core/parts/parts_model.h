@@ -14,9 +14,14 @@
 
 namespace eigenpose {
 
-/// What an object's own views say of how well it is matched: see calibrate_parts. A score is the share of
-/// window votes that the best pose does not get, after alignment: 0 is perfect, 1 nothing in common.
+/// What an object's own views say of how well it is matched.
 struct PartsCalibration {
+  /// A whole region farther from the manifold after alignment, in the universal eigenspace, is unknown: see
+  /// calibrate_match.
+  double rejection_distance = 0.0;
+  double typical_distance = 0.0;  ///< root mean square of new views of the object
+  /// A score is the share of window votes that the best pose does not get: 0 is perfect, 1 nothing in common;
+  /// see calibrate_parts.
   double rejection_score = 1.0;  ///< a region with a larger score is unknown
   double typical_score = 0.1;    ///< mean score of the object's own views
   double covered_share = 0.1;    ///< a region with a larger share of foreign windows is taken as covered
@@ -34,6 +39,9 @@ struct PartsModel {
   std::vector<PoseSpace> poses;               ///< one an object
   std::vector<PartsCalibration> calibration;  ///< one an object
 
+  /// The whole region settles which object it is when its squared distance is below this times that of the
+  /// nearest other object: see calibrate_match.
+  double sure_ratio = 0.3;
   /// The smallest rate of wrong rejections that the number of learned views can support, 1/(n + 1).
   double smallest_rate = 1.0;
 

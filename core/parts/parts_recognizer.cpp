@@ -82,7 +82,8 @@ struct PartsRecognizer::Impl {
   cv::Mat picture;
   cv::Mat aligned;
   CellMap map;
-  QueryWindows windows;
+  QueryWindows windows;  ///< of the picture, once they were asked for
+  bool windows_made = false;
   QueryWindows aligned_windows;
   PosePicture pose_picture;
   std::vector<PartialVote> votes;
@@ -247,12 +248,21 @@ void PartsRecognizer::look(const cv::Mat& picture) {
   } else {
     cv::resize(picture, impl_->picture, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
   }
-  impl_->mapper.compute(impl_->picture, impl_->map);
-  make_query_windows(impl_->map, impl_->model.space, impl_->model.scale, impl_->model.voting, impl_->windows);
   make_pose_picture(impl_->picture, impl_->pose_picture);
+  impl_->windows_made = false;
+}
+
+const PosePicture& PartsRecognizer::pose_picture() const {
+  return impl_->pose_picture;
 }
 
 std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> shortlist) {
+  if (!impl_->windows_made) {
+    impl_->mapper.compute(impl_->picture, impl_->map);
+    make_query_windows(impl_->map, impl_->model.space, impl_->model.scale, impl_->model.voting,
+                       impl_->windows);
+    impl_->windows_made = true;
+  }
   return impl_->matcher.match(
       impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
 }

@@ -43,6 +43,8 @@ class PartsRecognizer {
 
   /// Takes a square 8-bit picture with the model's bands. Call before the others.
   void look(const cv::Mat& picture);
+  /// The picture looked at, ready for alignment.
+  [[nodiscard]] const PosePicture& pose_picture() const;
   /// Votes of all objects (or of `shortlist`), most first.
   std::span<const PartialVote> vote(std::span<const std::size_t> shortlist = {});
   /// Pose of one object in the picture looked at, once it has been voted on.

@@ -12,29 +12,20 @@
 #include <opencv2/core.hpp>
 
 #include "core/manifold/manifold.h"
+#include "core/parts/misalignment.h"
 
 namespace eigenpose {
 
 /// A grey picture ready for alignment, and how it changes from pixel to pixel.
 struct PosePicture {
   static constexpr int side = 64;
-  std::vector<float> blurred;  ///< 64×64, Gaussian σ = 1.5 px: for the coarse scale
-  std::vector<float> sharp;    ///< 64×64, for the fine scale
+  /// 64×64 texels of 4 floats: brightness 0…1, its central differences after x and y, and 0.
+  std::vector<float> blurred;  ///< Gaussian σ = 1.5 px: for the coarse scale
+  std::vector<float> sharp;    ///< for the fine scale
 };
 
 /// Makes `out` from a square CV_8UC1 or CV_8UC3 picture of any size.
 void make_pose_picture(const cv::Mat& picture, PosePicture& out);
-
-/// How a region is misaligned with the learned views: brightness is multiplied by 1 + gain; the region's
-/// centre is moved by (dx, dy), it is enlarged by 1 + scale and turned by `rotation` about its middle.
-struct Misalignment {
-  static constexpr int unknowns = 5;
-  double gain = 0.0;
-  double dx = 0.0;  ///< share of the picture's side
-  double dy = 0.0;
-  double scale = 0.0;
-  double rotation = 0.0;  ///< radians
-};
 
 /// One scale of a pose space.
 struct PoseScale {

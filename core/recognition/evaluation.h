@@ -41,7 +41,8 @@ struct EvaluationOptions {
   RecognizerOptions recognizer;
   TestDamage damage;
   /// Also show the test views of every object to a model that does not hold it: they are strangers. The
-  /// object is taken out of the learned model; eigenspaces and thresholds stay as learned with all.
+  /// object is taken out of the learned model, and its views out of what thresholds are set from; eigenspaces
+  /// stay as learned with all.
   bool leave_one_out = false;
   unsigned threads = 0;
 };

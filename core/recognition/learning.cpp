@@ -127,17 +127,6 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     spaces =
         learn_object_spaces(views, told.evidence, options.spline_degree, options.threads, progress, stop);
   told.object_space_time = watch.lap();
-  if (options.parts) {
-    const std::vector<PartsViews> pictures = parts_views(views);
-    PartsLearningOptions parts_options;
-    parts_options.threads = options.threads;
-    options.calibration.threads = options.threads;
-    PartsModel parts = learn_parts(pictures, parts_options, progress, stop);
-    calibrate_parts(parts, pictures, options.calibration, progress, stop);
-    model.parts = std::make_shared<const PartsModel>(std::move(parts));
-    told.parts_time = watch.lap();
-  }
-
   for (std::size_t o = 0; o < manifolds.size(); ++o) {
     const ObjectViews& object = views.objects()[o];
     const RejectionEvidence& evidence = told.evidence[o];
@@ -149,6 +138,25 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     learned.views = object.count;
     if (options.object_spaces) learned.space = std::move(spaces[o]);
     model.objects.push_back(std::move(learned));
+  }
+  if (options.parts) {
+    const std::vector<PartsViews> pictures = parts_views(views);
+    PartsLearningOptions parts_options;
+    parts_options.threads = options.threads;
+    options.calibration.threads = options.threads;
+    options.match.threads = options.threads;
+    const auto parts = std::make_shared<PartsModel>(learn_parts(pictures, parts_options, progress, stop));
+    calibrate_parts(*parts, pictures, options.calibration, progress, stop);
+    model.parts = parts;
+    told.match = measure_match(model, views, points, options.match, progress, stop);
+    const MatchThresholds match = match_thresholds(told.match, options.match);
+    parts->sure_ratio = match.sure_ratio;
+    parts->smallest_rate = match.smallest_rate;
+    for (std::size_t o = 0; o < told.match.size(); ++o) {
+      parts->calibration[o].rejection_distance = match.rejection_distance[o];
+      parts->calibration[o].typical_distance = told.match[o].typical_distance;
+    }
+    told.parts_time = watch.lap();
   }
   model.provenance = {options.program_version, utc_now(), options.image_sets, told.solver.solver,
                       told.solver.energy};

@@ -10,6 +10,7 @@
 #include "core/base/progress.h"
 #include "core/model/model.h"
 #include "core/parts/parts_calibration.h"
+#include "core/recognition/match_calibration.h"
 #include "core/recognition/rejection.h"
 #include "core/recognition/view_store.h"
 #include "core/subspace/solver.h"
@@ -27,8 +28,9 @@ struct LearningOptions {
   /// Learn windows and pose spaces too: matching that bears covers and misalignment. Without, only the whole
   /// region is matched. They look at brightness whatever the image type is; of range there are none.
   bool parts = true;
-  PartsCalibrationOptions calibration;
-  unsigned threads = 0;  ///< 0: all cores. The model does not depend on it.
+  MatchCalibrationOptions match;        ///< thresholds of the whole region, with parts
+  PartsCalibrationOptions calibration;  ///< thresholds of windows
+  unsigned threads = 0;                 ///< 0: all cores. The model does not depend on it.
   /// Memory for views and solver, bytes; 0 means no limit. Views that do not fit are kept on disk and read in
   /// tiles. Beside it stand the model itself (windows and own spaces grow with the views) and a few pictures
   /// a thread.
@@ -43,6 +45,7 @@ struct LearningReport {
   std::size_t views = 0;
   SolverReport solver;
   std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
+  std::vector<MatchEvidence> match;         ///< the same of the aligned match; empty without parts
   Duration normalize_time{};
   Duration eigenspace_time{};
   Duration manifold_time{};

@@ -27,9 +27,8 @@ std::string_view verdict_name(Verdict verdict);
 struct Hypothesis {
   std::string object;
   std::vector<double> q;  ///< pose: m values in the units of the object's workspace, canonical
-  /// Smaller is nearer. A model with windows (the default): 1 − the object's share of the votes, 0…1.
-  /// Without: Euclidean in the eigenspace, between unit-energy appearances, 0…2. Compare only within one
-  /// model.
+  /// Euclidean in the eigenspace, between unit-energy appearances, 0…2; smaller is nearer. With a model that
+  /// knows windows (the default), after alignment.
   double distance = 0.0;
 };
 
@@ -46,7 +45,10 @@ struct Outcome {
   /// 1-sigma uncertainty of each value of `best->q`, in its unit; infinite where the pose cannot be seen.
   std::vector<double> q_sigma;
   double rejection_distance = 0.0;  ///< of the best object; `best->distance` is compared with it
-  double confidence = 0.0;          ///< 0…1
+  /// Share of the region that does not show the best object: something covers it, or stands beside it. An
+  /// object that is partly covered is recognised by its windows, whatever its distance.
+  double covered_share = 0.0;
+  double confidence = 0.0;  ///< 0…1
 };
 
 }  // namespace eigenpose

@@ -17,21 +17,32 @@ constexpr double clear_lead = 0.6;
 constexpr double most_covered = 0.5;
 /// Poses this much less likely than the best (natural logarithm) are not worth telling: a factor of 20.
 constexpr double likely_pose = 3.0;
+/// Another pose this much less likely leaves no doubt of the best.
+constexpr double sure_pose = 8.0;
 /// The curvature of the cost promises more than left-out views keep: 68 % lie within this many times its
 /// sigma.
 constexpr double sigma_inflation = 1.8;
+/// Others farther than this do not put a match in doubt.
+double reach_of_others(const Model& model) {
+  double largest = 0.0;
+  for (const PartsCalibration& own : model.parts->calibration)
+    largest = std::max(largest, own.rejection_distance);
+  return largest / std::sqrt(std::max(model.parts->sure_ratio, 1e-3));
+}
 
 }  // namespace
 
-PartsStage::PartsStage(const Model& model)
+PartsStage::PartsStage(const Model& model, const ManifoldSearch& search)
     : model_(model),
       recognizer_(*model.parts),
+      match_(model, search, reach_of_others(model)),
       picture_(model.normalization.size, model.normalization.size,
                picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
-bool PartsStage::accepted(const PartsAnswer& answer, double runner_up_share) const {
+bool PartsStage::accepted(const PartsAnswer& answer, const RealignedDistance& distance,
+                          double runner_up_share) const {
   const PartsCalibration& calibration = model_.parts->calibration[answer.object];
-  if (answer.score <= calibration.rejection_score) return true;
+  if (distance.own <= calibration.rejection_distance) return true;
   if (answer.covered <= calibration.covered_share || answer.covered > most_covered ||
       runner_up_share > clear_lead)
     return false;
@@ -40,58 +51,116 @@ bool PartsStage::accepted(const PartsAnswer& answer, double runner_up_share) con
   return rest <= calibration.rejection_score;
 }
 
-void PartsStage::judge(std::span<const float> picture, std::optional<std::size_t> sure, Outcome& outcome) {
+bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<const double> b) const {
+  const Workspace& workspace = model_.objects[object].workspace;
+  for (std::size_t d = 0; d < a.size(); ++d)
+    if (std::abs(workspace[d].difference(a[d], b[d])) > poses_apart * workspace[d].period()) return true;
+  return false;
+}
+
+void PartsStage::judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome) {
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   recognizer_.look(picture_);
-  if (sure) {
-    recognizer_.vote({&*sure, 1});
-    const PartsAnswer answer = recognizer_.settle(*sure);
-    const PartsCalibration& calibration = model_.parts->calibration[*sure];
-    if (answer.score <= calibration.rejection_score && answer.covered <= calibration.covered_share) {
-      describe(answer, 0.0, outcome);
-      return;
-    }
+  if (!settle(picture, nearest, outcome)) vote(picture, outcome);
+}
+
+bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outcome& outcome) {
+  const PartsCalibration& calibration = model_.parts->calibration[object];
+  const std::vector<AlignedPose>& aligned = match_.align(recognizer_.pose_picture(), object);
+  Finding finding;
+  finding.object = object;
+  finding.distance = match_.distance(picture, aligned.front().misalignment, object);
+  const double own = finding.distance.own;
+  if (own > calibration.rejection_distance) return false;
+  if (const auto& other = finding.distance.other;
+      other && own * own > model_.parts->sure_ratio * other->distance * other->distance)
+    return false;
+  poses_.clear();
+  bool clear = true;
+  for (const AlignedPose& found : aligned) {
+    PartsPose pose{found.q, found.q_sigma, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+                   0.0};
+    pose.merit = -0.5 * pose.cost / model_.parts->noise;
+    if (!poses_.empty() && apart(object, pose.q, poses_.front().q))
+      clear = clear && pose.merit < poses_.front().merit - sure_pose;
+    poses_.push_back(std::move(pose));
   }
+  if (clear) {
+    finding.poses = poses_;
+    describe(finding, true, outcome);
+    return true;
+  }
+  // Which object is plain, which pose is not: its windows know more.
+  recognizer_.vote({&object, 1});
+  const PartsAnswer answer = recognizer_.settle(object);
+  if (answer.covered > calibration.covered_share) return false;
+  finding.poses = answer.poses;
+  describe(finding, true, outcome);
+  return true;
+}
+
+void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
   const auto votes = recognizer_.vote();
   const double share = votes.size() > 1 && votes[0].score > 0.0F
                            ? static_cast<double>(votes[1].score) / static_cast<double>(votes[0].score)
                            : 0.0;
   const std::optional<PartialVote> second = votes.size() > 1 ? std::optional(votes[1]) : std::nullopt;
   const PartsAnswer answer = recognizer_.settle(votes[0].object);
-  describe(answer, share, outcome);
+  Finding finding;
+  finding.object = answer.object;
+  finding.poses = answer.poses;
+  finding.distance = match_.distance(picture, answer.poses.front().misalignment, answer.object);
+  finding.covered = answer.covered;
+  finding.runner_up_share = share;
+  describe(finding, accepted(answer, finding.distance, share), outcome);
   if (second && second->score > 0.0F) {
     const PartsAnswer other = recognizer_.settle(second->object);
-    outcome.runner_up = {model_.objects[other.object].name, other.poses.front().q, other.score};
+    const PartsPose& pose = other.poses.front();
+    outcome.runner_up = {model_.objects[other.object].name, pose.q,
+                         match_.distance(picture, pose.misalignment, other.object).own};
   }
 }
 
-void PartsStage::describe(const PartsAnswer& answer, double runner_up_share, Outcome& outcome) const {
-  const ModelObject& object = model_.objects[answer.object];
-  const PartsCalibration& calibration = model_.parts->calibration[answer.object];
-  const PartsPose& best = answer.poses.front();
-  outcome.best = {object.name, best.q, answer.score};
-  outcome.rejection_distance = calibration.rejection_score;
+void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcome) const {
+  const ModelObject& object = model_.objects[finding.object];
+  const PartsCalibration& calibration = model_.parts->calibration[finding.object];
+  const PartsPose& best = finding.poses.front();
+  outcome.best = {object.name, best.q, finding.distance.own};
+  outcome.rejection_distance = calibration.rejection_distance;
+  outcome.covered_share = finding.covered;
   outcome.q_sigma.clear();
   for (std::size_t d = 0; d < best.q_sigma.size(); ++d)
     outcome.q_sigma.push_back(object.dof_observable[d] ? sigma_inflation * best.q_sigma[d]
                                                        : std::numeric_limits<double>::infinity());
-  if (!accepted(answer, runner_up_share)) {
+  if (const auto& other = finding.distance.other) {
+    const ModelObject& second = model_.objects[other->manifold];
+    outcome.runner_up = {
+        second.name,
+        {other->q.begin(), other->q.begin() + static_cast<std::ptrdiff_t>(second.workspace.size())},
+        other->distance};
+  }
+  if (!accepted) {
     outcome.verdict = Verdict::unknown;
     outcome.confidence = 0.0;
     return;
   }
-  outcome.verdict = runner_up_share > tie ? Verdict::ambiguous : Verdict::recognized;
-  const double lead = 1.0 - runner_up_share;
-  outcome.confidence =
-      std::clamp((1.0 - answer.covered) * (runner_up_share > 0.0 ? 0.5 + 0.5 * lead : 1.0), 0.0, 1.0);
-  for (std::size_t p = 1; p < answer.poses.size(); ++p) {
-    const PartsPose& pose = answer.poses[p];
-    bool apart = false;
-    for (std::size_t d = 0; d < pose.q.size(); ++d)
-      apart = apart || std::abs(object.workspace[d].difference(pose.q[d], best.q[d])) >
-                           poses_apart * object.workspace[d].period();
-    if (apart && pose.merit > best.merit - likely_pose) {
-      outcome.other_pose = {object.name, pose.q, 1.0 - pose.votes};
+  outcome.verdict = finding.runner_up_share > tie ? Verdict::ambiguous : Verdict::recognized;
+  if (finding.runner_up_share > 0.0) {
+    outcome.confidence =
+        std::clamp((1.0 - finding.covered) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
+  } else {
+    const double variance =
+        calibration.typical_distance * calibration.typical_distance / effective_dimensions;
+    const auto likelihood = [&](double distance) {
+      return std::exp(-(distance * distance - finding.distance.own * finding.distance.own) /
+                      (2.0 * std::max(variance, 1e-12)));
+    };
+    const double second = finding.distance.other ? likelihood(finding.distance.other->distance) : 0.0;
+    outcome.confidence = 1.0 / (1.0 + second + likelihood(calibration.rejection_distance));
+  }
+  for (const PartsPose& pose : finding.poses.subspan(1)) {
+    if (pose.merit > best.merit - likely_pose && apart(finding.object, pose.q, best.q)) {
+      outcome.other_pose = {object.name, pose.q, finding.distance.own};
       break;
     }
   }

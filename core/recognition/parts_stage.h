@@ -1,41 +1,61 @@
 #pragma once
 
-/// The second stage of recognition: partial matching and alignment of one region, turned into an outcome.
+/// The second stage of recognition: alignment of the whole region and, where that does not settle it, partial
+/// matching, turned into an outcome.
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 
 #include <opencv2/core.hpp>
 
+#include "core/manifold/search.h"
 #include "core/model/model.h"
 #include "core/parts/parts_recognizer.h"
+#include "core/recognition/aligned_match.h"
 #include "core/recognition/outcome.h"
 
 namespace eigenpose {
 
 /// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
 inline constexpr double poses_apart = 1.0 / 12.0;
+/// Numbers of a point that vary independently when a view is moved: the typical distance spreads over about
+/// so many. It turns distances into likelihoods.
+inline constexpr double effective_dimensions = 6.0;
 
-/// Judges regions by windows and alignment. Holds scratch memory: one thread at a time.
+/// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
  public:
-  /// @pre model.parts is set. The model outlives the stage.
-  explicit PartsStage(const Model& model);
+  /// @pre model.parts is set. The model and `search`, over its manifolds, outlive the stage.
+  PartsStage(const Model& model, const ManifoldSearch& search);
 
   /// Fills everything of `outcome` but its box.
-  /// @param picture as the normaliser makes it. @param sure the object that the whole region shows beyond
-  /// doubt, if there is one: then the others are only asked when alignment does not agree.
-  void judge(std::span<const float> picture, std::optional<std::size_t> sure, Outcome& outcome);
+  /// @param picture as the normaliser makes it. @param nearest the object whose manifold is nearest.
+  void judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome);
 
  private:
-  void describe(const PartsAnswer& answer, double runner_up_share, Outcome& outcome) const;
-  [[nodiscard]] bool accepted(const PartsAnswer& answer, double runner_up_share) const;
+  /// One pose of one object, wherever it was found.
+  struct Finding {
+    std::size_t object = 0;
+    std::span<const PartsPose> poses;
+    RealignedDistance distance;
+    double covered = 0.0;
+    double runner_up_share = 0.0;  ///< of votes; 0 where the whole region settled it
+  };
+
+  /// The whole region alone. True when it left no doubt, and `outcome` is filled.
+  bool settle(std::span<const float> picture, std::size_t object, Outcome& outcome);
+  void vote(std::span<const float> picture, Outcome& outcome);
+  void describe(const Finding& finding, bool accepted, Outcome& outcome) const;
+  [[nodiscard]] bool accepted(const PartsAnswer& answer, const RealignedDistance& distance,
+                              double runner_up_share) const;
+  [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 
   const Model& model_;
   PartsRecognizer recognizer_;
+  AlignedMatch match_;
   cv::Mat picture_;
+  std::vector<PartsPose> poses_;
 };
 
 }  // namespace eigenpose

@@ -23,19 +23,12 @@ using SteadyTime = std::chrono::steady_clock;
 
 /// How far beyond the largest rejection distance the search looks for the runner-up.
 constexpr double search_reach = 1.5;
-/// Numbers of a point that vary independently when a view is moved: the typical distance spreads over about
-/// so many. Measured on moved views of learned objects; it turns distances into likelihoods.
-constexpr double effective_dimensions = 6.0;
 /// Below this probability of the best against the second best, the outcome is ambiguous.
 constexpr double sure_enough = 0.7;
 /// Where the second best object is nearer than this times the best, the objects' own spaces decide.
 constexpr double second_look_ratio = 2.0;
 /// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.
 constexpr double least_side_share = 0.25;
-
-/// The whole region settles which object it is when the squared distance to the second is this many times
-/// larger.
-constexpr double sure_ratio = 1.0 / 0.3;
 
 /// Adds the time since it was made to a duration.
 class Lap {
@@ -110,8 +103,6 @@ struct Recognizer::Impl {
   /// is seen best.
   void look_again();
   void judge(Outcome& outcome);
-  /// The nearest object, if the whole region leaves no doubt of it.
-  [[nodiscard]] std::optional<std::size_t> sure_object() const;
   void estimate_pose(Outcome& outcome, const ClosestPoint& best);
 
   Outcome& next_outcome();
@@ -138,7 +129,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
     search_bound = std::max(search_bound, search_reach * object.rejection_distance);
   if (options.rejector && search_bound > 0.0)
     rejector = std::make_unique<RejectionSearch>(manifolds, RejectorOptions{.distance = search_bound});
-  if (model->parts) parts.emplace(*model);
+  if (model->parts) parts.emplace(*model, *search);
 }
 
 std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
@@ -204,15 +195,6 @@ void Recognizer::Impl::look_again() {
     closest[0].q = own.q;
 }
 
-std::optional<std::size_t> Recognizer::Impl::sure_object() const {
-  const ClosestPoint& best = closest[0];
-  if (best.distance > model->objects[best.manifold].rejection_distance) return std::nullopt;
-  if (closest_count > 1 &&
-      closest[1].distance * closest[1].distance < sure_ratio * best.distance * best.distance)
-    return std::nullopt;
-  return best.manifold;
-}
-
 void Recognizer::Impl::judge(Outcome& outcome) {
   const ClosestPoint& best = closest[0];
   const ModelObject& object = model->objects[best.manifold];
@@ -261,6 +243,7 @@ Outcome& Recognizer::Impl::next_outcome() {
   give_back(outcome.other_pose);
   outcome.q_sigma.clear();
   outcome.rejection_distance = 0.0;
+  outcome.covered_share = 0.0;
   outcome.confidence = 0.0;
   return outcome;
 }
@@ -340,7 +323,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
       const Lap lap(spent.search);
       impl.find_closest();
       if (impl.parts) {
-        impl.parts->judge(impl.picture(), impl.sure_object(), outcome);
+        impl.parts->judge(impl.picture(), impl.closest[0].manifold, outcome);
       } else {
         impl.look_again();
         impl.judge(outcome);

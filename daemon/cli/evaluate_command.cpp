@@ -188,6 +188,7 @@ int run_evaluate(const EvaluateOptions& options, const std::stop_token& stop) {
   evaluation.damage = parse_damage(options);
   evaluation.leave_one_out = options.leave_one_out;
   evaluation.learning.calibration.rate = options.rejection_rate;
+  evaluation.learning.match.rate = options.rejection_rate;
   ConsoleProgress progress;
   const EvaluationReport report = evaluate(sets, evaluation, progress.callback(), stop);
   progress.clear();
