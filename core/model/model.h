@@ -23,7 +23,7 @@ struct ModelObject {
   std::string name;
   Workspace workspace;
   Manifold manifold;                ///< in the universal eigenspace
-  double rejection_distance = 0.0;  ///< a region farther than this is unknown
+  double rejection_distance = 0.0;  ///< without alignment: a region farther than this is unknown
   /// Root mean square distance of views known to show this object, slightly moved and scaled: the yardstick
   /// for "about as well".
   double typical_distance = 0.0;
@@ -54,6 +54,12 @@ struct Model {
   /// Windows and pose spaces, in the order of `objects`; null where only the whole region is matched.
   std::shared_ptr<const PartsModel> parts;
   Provenance provenance;
+
+  /// Beyond this distance a region that is nearest to object `o` is unknown: after alignment, where the model
+  /// knows windows.
+  [[nodiscard]] double rejection_distance(std::size_t o) const {
+    return parts ? parts->calibration[o].rejection_distance : objects[o].rejection_distance;
+  }
 };
 
 }  // namespace eigenpose

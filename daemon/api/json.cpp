@@ -150,7 +150,7 @@ json objects_json(const Service& service) {
     if (object.learned_as && model && *object.learned_as < model->objects.size()) {
       const ModelObject& learned = model->objects[*object.learned_as];
       entry["learned"] = {{"views", learned.views},
-                          {"rejection_distance", learned.rejection_distance},
+                          {"rejection_distance", model->rejection_distance(*object.learned_as)},
                           {"pose_observable", learned.pose_observable},
                           {"workspace", to_json(learned.workspace)}};
     }

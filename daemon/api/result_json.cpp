@@ -49,6 +49,7 @@ json to_json(const Result& result, const Outcome& outcome) {
                 {"distance", nullptr},
                 {"q_sigma", std::move(sigma)},
                 {"rejection_distance", outcome.rejection_distance},
+                {"covered_share", outcome.covered_share},
                 {"confidence", outcome.confidence},
                 {"runner_up", to_json(result, outcome.runner_up)},
                 {"other_pose", to_json(result, outcome.other_pose)}};

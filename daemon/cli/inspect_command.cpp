@@ -32,7 +32,8 @@ struct InspectOptions {
 
 json to_json(const Model& model) {
   json objects = json::array();
-  for (const ModelObject& object : model.objects) {
+  for (std::size_t o = 0; o < model.objects.size(); ++o) {
+    const ModelObject& object = model.objects[o];
     json axes = json::array();
     for (std::size_t d = 0; d < object.workspace.size(); ++d) {
       const Dof& dof = object.workspace[d];
@@ -46,7 +47,7 @@ json to_json(const Model& model) {
     }
     objects.push_back({{"name", object.name},
                        {"views", object.views},
-                       {"rejection_distance", object.rejection_distance},
+                       {"rejection_distance", model.rejection_distance(o)},
                        {"typical_distance", object.typical_distance},
                        {"pose_observable", object.pose_observable},
                        {"spline_degree", object.manifold.degree()},
@@ -80,8 +81,9 @@ void print(const Model& model) {
               model.provenance.solver.c_str(), 100.0 * model.provenance.energy);
   std::printf("\n%-16s %6s %18s %9s  %s\n", "object", "views", "rejection distance", "typical",
               "degrees of freedom");
-  for (const ModelObject& object : model.objects) {
-    std::printf("%-16s %6zu %18.4f %9.4f  ", object.name.c_str(), object.views, object.rejection_distance,
+  for (std::size_t o = 0; o < model.objects.size(); ++o) {
+    const ModelObject& object = model.objects[o];
+    std::printf("%-16s %6zu %18.4f %9.4f  ", object.name.c_str(), object.views, model.rejection_distance(o),
                 object.typical_distance);
     for (std::size_t d = 0; d < object.workspace.size(); ++d) {
       const Dof& dof = object.workspace[d];

@@ -55,7 +55,7 @@ void print(const Model& model, const LearningReport& report, const std::string& 
   for (std::size_t o = 0; o < model.objects.size(); ++o) {
     const ModelObject& object = model.objects[o];
     const double error = median(report.evidence[o].left_out_errors.front());
-    std::printf("%-16s %6zu %18.4f  ", object.name.c_str(), object.views, object.rejection_distance);
+    std::printf("%-16s %6zu %18.4f  ", object.name.c_str(), object.views, model.rejection_distance(o));
     if (!object.pose_observable)
       std::printf("cannot be seen: left-out views are %.0f %s off\n", error,
                   object.workspace[0].unit.c_str());

@@ -46,6 +46,7 @@ json to_json(const Outcome& outcome, const Model& model) {
                  {"q_sigma", sigma},
                  {"distance", nullptr},
                  {"rejection_distance", outcome.rejection_distance},
+                 {"covered_share", outcome.covered_share},
                  {"confidence", outcome.confidence},
                  {"runner_up", alternative(outcome.runner_up, model)},
                  {"other_pose", alternative(outcome.other_pose, model)}};

@@ -1,0 +1,114 @@
+#include "core/recognition/match_calibration.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/parts/misalignment.h"
+
+namespace eigenpose {
+namespace {
+
+/// Objects whose left-out views score 0.01, 0.02 … 1 in their scale, and that are `apart` from each other.
+std::vector<MatchEvidence> even_evidence(std::size_t objects, double scale, double apart) {
+  std::vector<MatchEvidence> evidence(objects);
+  for (MatchEvidence& own : evidence) {
+    own.scale = scale;
+    own.typical_distance = scale;
+    for (int i = 1; i <= 100; ++i) {
+      own.scores.push_back(0.05 * i);
+      own.others.push_back(apart);
+    }
+  }
+  return evidence;
+}
+
+MatchCalibrationOptions one_probe(double rate) {
+  MatchCalibrationOptions options;
+  options.rate = rate;
+  options.moved_views = 1;
+  return options;
+}
+
+TEST(MatchThresholds, HoldTheRateThatIsAskedFor) {
+  const auto evidence = even_evidence(10, 0.02, 9.0);
+  for (const double rate : {0.01, 0.05, 0.2}) {
+    const MatchThresholds found = match_thresholds(evidence, one_probe(rate));
+    std::size_t beyond = 0;
+    for (const MatchEvidence& own : evidence)
+      for (const double score : own.scores) beyond += score * own.scale > found.rejection_distance[0] ? 1 : 0;
+    EXPECT_LE(static_cast<double>(beyond) / 1000.0, rate);
+    EXPECT_GE(static_cast<double>(beyond) / 1000.0, rate - 0.02) << "stricter than was asked for";
+  }
+}
+
+TEST(MatchThresholds, SayTheSmallestRateThatTheViewsSupport) {
+  const MatchThresholds found = match_thresholds(even_evidence(3, 0.02, 9.0), one_probe(0.0));
+  EXPECT_DOUBLE_EQ(found.smallest_rate, 1.0 / 301.0);
+  EXPECT_NEAR(found.rejection_distance[0], 5.0 * 0.02, 1e-9) << "the largest distance that was seen";
+}
+
+TEST(MatchThresholds, StayBelowTheDistanceOfOtherObjects) {
+  const MatchThresholds found = match_thresholds(even_evidence(3, 0.02, 0.06), one_probe(0.001));
+  for (const double distance : found.rejection_distance) EXPECT_DOUBLE_EQ(distance, 0.06);
+  // However near the others are, what its own views need on average is left to an object.
+  EXPECT_DOUBLE_EQ(match_thresholds(even_evidence(3, 0.02, 0.001), one_probe(0.001)).rejection_distance[0],
+                   0.02);
+}
+
+TEST(MatchThresholds, UseNothingOfAnObjectThatIsLeftOut) {
+  auto evidence = even_evidence(3, 0.02, 0.5);
+  evidence[1].others.assign(100, 0.03);
+  evidence[1].scores.assign(100, 50.0);
+  evidence[1].false_lead = 0.01;
+  const MatchThresholds without = match_thresholds(evidence, one_probe(0.001), 1);
+  evidence.erase(evidence.begin() + 1);
+  const MatchThresholds never = match_thresholds(evidence, one_probe(0.001));
+  EXPECT_DOUBLE_EQ(without.rejection_distance[0], never.rejection_distance[0]);
+  EXPECT_DOUBLE_EQ(without.rejection_distance[2], never.rejection_distance[1]);
+  EXPECT_DOUBLE_EQ(without.sure_ratio, never.sure_ratio);
+}
+
+TEST(MatchThresholds, CountNoLeadThatAWrongObjectHasHad) {
+  auto evidence = even_evidence(2, 0.02, 0.5);
+  const double before = match_thresholds(evidence, one_probe(0.001)).sure_ratio;
+  evidence[0].false_lead = 0.1;
+  EXPECT_LT(match_thresholds(evidence, one_probe(0.001)).sure_ratio, std::min(before, 0.1));
+}
+
+TEST(Misalignment, UndoneIsThePictureItself) {
+  // A smooth picture, so that resampling twice loses little.
+  constexpr int side = 64;
+  const auto at = [](double x, double y) {
+    return std::exp(-((x - 30) * (x - 30) / 150 + (y - 34) * (y - 34) / 90));
+  };
+  const Misalignment m{0.0, 0.03, -0.02, 0.04, 0.05};
+  std::vector<float> moved(side * side);
+  std::vector<float> undone(side * side);
+  const double middle = 0.5 * (side - 1);
+  const double cosine = std::cos(m.rotation);
+  const double sine = std::sin(m.rotation);
+  for (int r = 0; r < side; ++r)
+    for (int c = 0; c < side; ++c) {
+      // Where a pixel of the moved picture comes from.
+      const double u = (c - middle - side * m.dx) / (1.0 + m.scale);
+      const double v = (r - middle - side * m.dy) / (1.0 + m.scale);
+      moved[static_cast<std::size_t>(r * side + c)] =
+          static_cast<float>(at(middle + cosine * u + sine * v, middle - sine * u + cosine * v));
+    }
+  const float energy = undo_misalignment(moved, side, 1, m, undone);
+  double squared = 0.0;
+  double total = 0.0;
+  for (int r = 0; r < side; ++r)
+    for (int c = 0; c < side; ++c) {
+      const double expected = at(c, r);
+      squared += std::pow(undone[static_cast<std::size_t>(r * side + c)] - expected, 2);
+      total += expected * expected;
+    }
+  EXPECT_LT(std::sqrt(squared / total), 0.01) << "bilinear interpolation costs less than 1 %";
+  EXPECT_NEAR(energy, std::sqrt(total), 0.01 * std::sqrt(total));
+}
+
+}  // namespace
+}  // namespace eigenpose
