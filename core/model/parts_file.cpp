@@ -87,6 +87,7 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
     const Hdf5Group object = objects.make_group(numbered(o));
     write_windows(object, parts.objects[o]);
     object.write("rejection_distance", parts.calibration[o].rejection_distance);
+    object.write("sure_distance", parts.calibration[o].sure_distance);
     object.write("typical_distance", parts.calibration[o].typical_distance);
     object.write("rejection_score", parts.calibration[o].rejection_score);
     object.write("typical_score", parts.calibration[o].typical_score);
@@ -123,6 +124,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
     parts.objects.push_back(read_windows(object, parts.scale));
     PartsCalibration calibration;
     calibration.rejection_distance = object.read_double("rejection_distance");
+    calibration.sure_distance = object.read_double("sure_distance");
     calibration.typical_distance = object.read_double("typical_distance");
     calibration.rejection_score = object.read_double("rejection_score");
     calibration.typical_score = object.read_double("typical_score");

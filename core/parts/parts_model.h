@@ -19,6 +19,7 @@ struct PartsCalibration {
   /// A whole region farther from the manifold after alignment, in the universal eigenspace, is unknown: see
   /// calibrate_match.
   double rejection_distance = 0.0;
+  double sure_distance = 0.0;     ///< beyond it, windows must agree that it is the object
   double typical_distance = 0.0;  ///< root mean square of new views of the object
   /// A score is the share of window votes that the best pose does not get: 0 is perfect, 1 nothing in common;
   /// see calibrate_parts.

@@ -101,8 +101,11 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
     auto parts = std::make_shared<PartsModel>(*model.parts);
     const MatchThresholds thresholds = match_thresholds(evidence, options, object);
     parts->sure_ratio = thresholds.sure_ratio;
-    for (std::size_t o = 0; o < evidence.size(); ++o)
-      parts->calibration[o].rejection_distance = thresholds.rejection_distance[o];
+    for (std::size_t o = 0; o < evidence.size(); ++o) {
+      PartsCalibration& own = parts->calibration[o];
+      own.rejection_distance = thresholds.rejection_distance[o];
+      own.sure_distance = std::min(own.sure_distance, own.rejection_distance);
+    }
     parts->objects.erase(parts->objects.begin() + at);
     parts->poses.erase(parts->poses.begin() + at);
     parts->calibration.erase(parts->calibration.begin() + at);

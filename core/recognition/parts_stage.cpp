@@ -42,7 +42,9 @@ PartsStage::PartsStage(const Model& model, const ManifoldSearch& search)
 bool PartsStage::accepted(const PartsAnswer& answer, const RealignedDistance& distance,
                           double runner_up_share) const {
   const PartsCalibration& calibration = model_.parts->calibration[answer.object];
-  if (distance.own <= calibration.rejection_distance) return true;
+  if (distance.own <= calibration.sure_distance) return true;
+  if (distance.own <= calibration.rejection_distance && answer.score <= calibration.rejection_score)
+    return true;
   if (answer.covered <= calibration.covered_share || answer.covered > most_covered ||
       runner_up_share > clear_lead)
     return false;
@@ -71,7 +73,7 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
   finding.object = object;
   finding.distance = match_.distance(picture, aligned.front().misalignment, object);
   const double own = finding.distance.own;
-  if (own > calibration.rejection_distance) return false;
+  if (own > calibration.sure_distance) return false;
   if (const auto& other = finding.distance.other;
       other && own * own > model_.parts->sure_ratio * other->distance * other->distance)
     return false;
