@@ -43,7 +43,7 @@ TEST(Example, LearnsAndRecognizesWithTheLibraryAlone) {
   std::ofstream(picture, std::ios::binary)
       .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
   const Ended done = run("'" + sets.string() + "' '" + (folder.path() / "a.model").string() + "' '" +
-                       picture.string() + "'");
+                         picture.string() + "'");
   ASSERT_EQ(done.code, 0) << done.output;
   EXPECT_THAT(done.output, HasSubstr("learned 2 objects from 48 views"));
   EXPECT_THAT(done.output, HasSubstr("recognized mug, turned by 1")) << "120 degrees, give or take 10";

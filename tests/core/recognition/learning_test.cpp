@@ -74,7 +74,9 @@ TEST_F(Learning, GivesTheSameModelFromMemoryAndFromDisk) {
   // Pictures may take half of it: 45 of 48. The rest is enough for the solver.
   options.memory_limit = 90 * picture_length(options.normalization);
   options.scratch_folder = root();
-  EXPECT_EQ(ViewStore(all_views(sets), {options.normalization, 1, options.memory_limit / 2}, {}, {}).resident(), 0U);
+  EXPECT_EQ(
+      ViewStore(all_views(sets), {options.normalization, 1, options.memory_limit / 2}, {}, {}).resident(),
+      0U);
   const Model disk = learn(all_views(sets), options);
   EXPECT_EQ(disk.eigenspace.basis, memory.eigenspace.basis);
   EXPECT_EQ(disk.objects[1].manifold.coefficients(), memory.objects[1].manifold.coefficients());
