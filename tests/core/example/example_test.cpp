@@ -24,7 +24,9 @@ struct Ended {
 
 Ended run(const std::string& arguments) {
   Ended result;
-  FILE* pipe = ::popen((std::string(EXAMPLE) + " " + arguments + " 2>&1").c_str(), "r");
+  std::string command = EXAMPLE;
+  command.append(" ").append(arguments).append(" 2>&1");
+  FILE* pipe = ::popen(command.c_str(), "r");
   if (pipe == nullptr) return result;
   std::array<char, 512> text{};
   while (std::fgets(text.data(), text.size(), pipe) != nullptr) result.output += text.data();

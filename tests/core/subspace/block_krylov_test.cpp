@@ -2,10 +2,10 @@
 
 #include <random>
 
-#include <Eigen/QR>
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "core/base/linear_algebra.h"
 #include "tests/core/subspace/subspace_samples.h"
 
 namespace eigenpose {
@@ -23,7 +23,7 @@ struct KnownMatrix {
     std::normal_distribution<double> normal;
     MatrixXd noise(values.size(), values.size());
     for (double& x : noise.reshaped()) x = normal(random);
-    vectors = Eigen::HouseholderQR<MatrixXd>(noise).householderQ();
+    vectors = orthonormal_span(noise, 1e-12);
     matrix = vectors * values.asDiagonal() * vectors.transpose();
     matrix = (0.5 * (matrix + matrix.transpose())).eval();
   }

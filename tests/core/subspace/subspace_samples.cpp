@@ -5,23 +5,18 @@
 #include <numbers>
 #include <random>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include "core/base/linear_algebra.h"
 
 namespace eigenpose::test {
 
 double largest_angle_deg(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b) {
   if (a.cols() != b.cols() || a.rows() != b.rows()) return 90.0;
-  const auto orthonormal = [](const Eigen::MatrixXf& m) {
-    const Eigen::MatrixXd wide = m.cast<double>();
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(wide);
-    return Eigen::MatrixXd(qr.householderQ() * Eigen::MatrixXd::Identity(m.rows(), m.cols()));
-  };
-  const Eigen::MatrixXd u = orthonormal(a);
-  const Eigen::MatrixXd v = orthonormal(b);
+  const Eigen::MatrixXd u = orthonormal_span(a.cast<double>(), 1e-12);
+  const Eigen::MatrixXd v = orthonormal_span(b.cast<double>(), 1e-12);
+  if (u.cols() != v.cols()) return 90.0;
   const Eigen::MatrixXd outside = v - u * (u.transpose() * v);
   const Eigen::MatrixXd square = outside.transpose() * outside;
-  const double sine = std::sqrt(Eigen::JacobiSVD<Eigen::MatrixXd>(square).singularValues()(0));
+  const double sine = std::sqrt(std::max(0.0, symmetric_eigen(square).values(0)));
   return std::asin(std::min(1.0, sine)) * 180.0 / std::numbers::pi;
 }
 
