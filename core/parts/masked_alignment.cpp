@@ -6,105 +6,181 @@
 
 #include <Eigen/LU>
 
+#include "core/parts/dense_kernels.h"
+
 namespace eigenpose {
 namespace {
 
-using Vector5 = Eigen::Matrix<double, 5, 1>;
-
 constexpr double free_gain = 1.0;  // a cover changes the energy: 1 σ of the gain
 constexpr int rounds = 5;
-constexpr int steps = 15;  // samples each way within the reach
+constexpr int trusting_rounds = 2;  // the first ones, weighted by what the windows trust
+constexpr int steps = 15;           // samples each way within the reach
+/// A pixel's variance, as a multiple of the noise that the splines leave spread over all pixels.
+constexpr double variance_of_pixels = 6.0;
+constexpr double robust_width = 3.0;      // σ at which a pixel's weight is a quarter
+constexpr double most_unexplained = 4.5;  // ½·3²
+/// Darker pixels say nothing of how well a pose fits: a third of a region's root mean square, 1/32.
+constexpr float dark = 0.01F;
+constexpr float trusted = 0.2F;
+constexpr double deviation_of_median = 1.4826;  // σ over the median of |r|, for normal r
 
 }  // namespace
 
-AlignedPose align_masked(const PosePicture& picture, const PoseSpace& space, const AlignmentOptions& options,
-                         const std::vector<float>& weights, const std::vector<double>& start, double reach) {
-  const PoseScale& scale = space.coarse();
-  const Eigen::VectorXf weight = Eigen::Map<const Eigen::VectorXf>(weights.data(), scale.basis.rows());
+MaskedAligner::MaskedAligner(const AlignmentOptions& options) : options_(options) {
   AlignmentPrior prior = options.prior;
   prior.gain = free_gain;
-  const Vector5 precision = prior.precision();
-  AlignedPose end;
-  end.q = start;
-  end.q_sigma.assign(start.size(), std::numeric_limits<double>::infinity());
-  const auto axes = space.coarse_manifold().axes();
-  Eigen::MatrixXf warped;
-  const auto template_at = [&](const std::vector<double>& q) -> Eigen::VectorXf {
-    return space.pixel_mean() + scale.basis * space.coarse_manifold().evaluate(q).cast<float>();
-  };
+  precision_ = prior.precision();
+}
 
-  // The gain that makes the trusted pixels agree is where the search begins.
-  scale.warp(picture, {}, false, warped);
-  {
-    const Eigen::VectorXf model = template_at(start);
-    const float own = (weight.array() * warped.col(0).array().square()).sum();
-    const float both = (weight.array() * warped.col(0).array() * model.array()).sum();
-    end.misalignment.gain = std::clamp(static_cast<double>(both / std::max(own, 1e-9F)) - 1.0, -0.8, 4.0);
+void MaskedAligner::look(const PosePicture& picture, const PoseSpace& space, std::span<const float> trust) {
+  picture_ = &picture;
+  space_ = &space;
+  trust_ = trust;
+  pixel_variance_ = variance_of_pixels * options_.noise / static_cast<double>(space.coarse().basis.rows());
+}
+
+void MaskedAligner::render(const std::vector<double>& q) {
+  rendered_.noalias() = space_->coarse().basis * space_->coarse_manifold().evaluate(q).cast<float>();
+  rendered_ += space_->pixel_mean();
+}
+
+double MaskedAligner::first_gain() const {
+  const auto region = warped_.col(0).array();
+  const float own = (weights_.array() * region.square()).sum();
+  const float both = (weights_.array() * region * rendered_.array()).sum();
+  return std::clamp(static_cast<double>(both / std::max(own, 1e-9F)) - 1.0, -0.8, 4.0);
+}
+
+void MaskedAligner::weigh_by_residual() {
+  residuals_.clear();
+  for (Eigen::Index i = 0; i < rendered_.size(); ++i) {
+    const float region = warped_(i, 0);
+    if (trust_[static_cast<std::size_t>(i)] > trusted && (rendered_(i) > dark || region > dark))
+      residuals_.push_back(std::fabs(rendered_(i) - region));
   }
-  const double first_gain = end.misalignment.gain;
+  double variance = pixel_variance_;
+  if (residuals_.size() > 20) {
+    const auto middle = residuals_.begin() + static_cast<std::ptrdiff_t>(residuals_.size() / 2);
+    std::nth_element(residuals_.begin(), middle, residuals_.end());
+    const double sigma = deviation_of_median * static_cast<double>(*middle);
+    variance = std::max(variance, sigma * sigma);
+  }
+  const auto scale = static_cast<float>(1.0 / (robust_width * robust_width * variance));
+  weights_ = (1.0F + scale * (rendered_ - warped_.col(0)).array().square()).square().inverse().matrix();
+}
+
+void MaskedAligner::prepare(const Misalignment& misalignment, double first_gain) {
+  const Eigen::MatrixXf& basis = space_->coarse().basis;
+  const auto pixels = static_cast<int>(basis.rows());
+  const auto dims = static_cast<int>(basis.cols());
+  weighted_.resize(pixels, 6);
+  weighted_.col(0) = weights_.cwiseProduct(space_->pixel_mean() - warped_.col(0));
+  weighted_.rightCols(5) = warped_.rightCols(5).array().colwise() * weights_.array();
+  weighted_basis_ = basis.array().colwise() * weights_.array();
+  // Six columns at a time; the last ones again where D is no multiple of six.
+  quadratic_.resize(dims, dims);
+  if (dims < 6) {
+    quadratic_.noalias() = basis.transpose() * weighted_basis_;
+  } else {
+    for (int first = 0; first < dims; first += 6) {
+      const int from = std::min(first, dims - 6);
+      multiply_transposed_six(basis.data(), pixels, dims, weighted_basis_.col(from).data(),
+                              quadratic_.col(from).data());
+    }
+  }
+  linear_.resize(dims, 6);
+  multiply_transposed_six(basis.data(), pixels, dims, weighted_.data(), linear_.data());
+  const Eigen::VectorXf difference = space_->pixel_mean() - warped_.col(0);
+  constant_ = static_cast<double>(weighted_.col(0).dot(difference));
+  constant_products_ = (weighted_.rightCols(5).transpose() * difference).cast<double>();
+
+  Vector5 undone;
+  undone << misalignment.gain - first_gain, misalignment.dx, misalignment.dy, misalignment.scale,
+      misalignment.rotation;
+  prior_pull_ = options_.noise * precision_.cwiseProduct(undone);
+  prior_cost_ = undone.dot(prior_pull_);
+  Eigen::Matrix<double, 5, 5> normal =
+      (weighted_.rightCols(5).transpose() * warped_.rightCols(5)).cast<double>();
+  normal.diagonal() += options_.noise * precision_;
+  inverse_ = normal.inverse();
+}
+
+double MaskedAligner::cost_at(const std::vector<double>& q, Vector5* x) {
+  const Eigen::VectorXf point = space_->coarse_manifold().evaluate(q).cast<float>();
+  product_.noalias() = quadratic_.selfadjointView<Eigen::Lower>() * point;
+  const double squared = static_cast<double>(point.dot(product_ + 2.0F * linear_.col(0))) + constant_;
+  const Vector5 b =
+      (linear_.rightCols(5).transpose() * point).cast<double>() + constant_products_ - prior_pull_;
+  const Vector5 best = inverse_ * b;
+  if (x != nullptr) *x = best;
+  return std::max(0.0, squared) + prior_cost_ - b.dot(best);
+}
+
+MaskedPose MaskedAligner::follow(const std::vector<double>& start, double reach) {
+  const PoseScale& scale = space_->coarse();
+  const auto axes = space_->coarse_manifold().axes();
+  MaskedPose end;
+  AlignedPose& pose = end.aligned;
+  pose.q = start;
+  pose.q_sigma.assign(start.size(), std::numeric_limits<double>::infinity());
+  weights_ = Eigen::Map<const Eigen::VectorXf>(trust_.data(), scale.basis.rows());
+  scale.warp(*picture_, {}, false, warped_);
+  render(start);
+  const double gain = first_gain();
+  pose.misalignment.gain = gain;
   double step_share = reach / steps;
+  const Vector5 limit = 3.0 * precision_.cwiseInverse().cwiseSqrt();
   for (int round = 0; round < rounds; ++round) {
-    scale.warp(picture, end.misalignment, true, warped);
-    const Eigen::MatrixXf tangents = warped.rightCols(5);
-    const Eigen::MatrixXf weighted = tangents.array().colwise() * weight.array();
-    Eigen::Matrix<double, 5, 5> normal = (weighted.transpose() * tangents).cast<double>();
-    normal.diagonal() += options.noise * precision;
-    const Eigen::Matrix<double, 5, 5> inverse = normal.inverse();
-    Vector5 undone;
-    undone << end.misalignment.gain - first_gain, end.misalignment.dx, end.misalignment.dy,
-        end.misalignment.scale, end.misalignment.rotation;
-    const Vector5 pull = options.noise * precision.cwiseProduct(undone);
-    const auto cost = [&](const std::vector<double>& q, Vector5* x) {
-      const Eigen::VectorXf residual = template_at(q) - warped.col(0);
-      const Vector5 b = (weighted.transpose() * residual).cast<double>() - pull;
-      const Vector5 best = inverse * b;
-      if (x != nullptr) {
-        *x = best;
-      }
-      return static_cast<double>((weight.array() * residual.array().square()).sum()) + undone.dot(pull) -
-             b.dot(best);
-    };
-    std::vector<double> here = end.q;
-    double lowest = std::numeric_limits<double>::infinity();
+    scale.warp(*picture_, pose.misalignment, true, warped_);
+    if (round >= trusting_rounds) {
+      render(pose.q);
+      weigh_by_residual();
+    }
+    prepare(pose.misalignment, gain);
+    std::vector<double> q = pose.q;
+    double lowest = cost_at(q, nullptr);
     for (std::size_t a = 0; a < axes.size(); ++a) {
-      if (axes[a].samples.size() < 2) {
-        continue;
-      }
+      if (axes[a].samples.size() < 2) continue;
       const double step = step_share * axes[a].dof.period();
-      std::vector<double> costs;
-      const double centre = here[a];
-      std::vector<double> q = here;
+      const double centre = q[a];
+      costs_.clear();
       for (int s = -steps; s <= steps; ++s) {
         q[a] = centre + s * step;
-        costs.push_back(cost(q, nullptr));
+        costs_.push_back(cost_at(q, nullptr));
       }
-      const auto best = std::min_element(costs.begin(), costs.end());
-      const auto at = static_cast<int>(best - costs.begin());
+      const auto best = std::min_element(costs_.begin(), costs_.end());
+      const auto at = static_cast<int>(best - costs_.begin());
       double offset = 0.0;
       if (at > 0 && at < 2 * steps) {
-        const double curvature =
-            costs[static_cast<std::size_t>(at - 1)] - 2.0 * *best + costs[static_cast<std::size_t>(at + 1)];
+        const double curvature = *(best - 1) - 2.0 * *best + *(best + 1);
         if (curvature > 0.0) {
-          offset = 0.5 * (costs[static_cast<std::size_t>(at - 1)] - costs[static_cast<std::size_t>(at + 1)]) /
-                   curvature;
-          end.q_sigma[a] = step * std::sqrt(2.0 * std::max(*best, options.noise) /
-                                            (curvature * static_cast<double>(scale.basis.cols())));
+          offset = 0.5 * (*(best - 1) - *(best + 1)) / curvature;
+          pose.q_sigma[a] = step * std::sqrt(2.0 * std::max(*best, options_.noise) /
+                                             (curvature * static_cast<double>(scale.basis.cols())));
         }
       }
-      here[a] = axes[a].dof.canonical(centre + (at - steps + offset) * step);
+      q[a] = axes[a].dof.canonical(centre + (at - steps + offset) * step);
       lowest = std::min(lowest, *best);
     }
-    end.q = here;
+    pose.q = q;
+    pose.cost = lowest;
     Vector5 x;
-    cost(end.q, &x);
-    const Vector5 limit = 3.0 * precision.cwiseInverse().cwiseSqrt();
-    Vector5 moved = undone + x;
+    cost_at(pose.q, &x);
+    const Misalignment& p = pose.misalignment;
+    Vector5 moved;
+    moved << p.gain - gain + x(0), p.dx + x(1), p.dy + x(2), p.scale + x(3), p.rotation + x(4);
     moved = moved.cwiseMax(-limit).cwiseMin(limit);
-    end.misalignment = {std::clamp(moved(0) + first_gain, -0.8, 5.0), moved(1), moved(2), moved(3), moved(4)};
-    end.cost = lowest;
+    pose.misalignment = {std::clamp(moved(0) + gain, -0.8, 5.0), moved(1), moved(2), moved(3), moved(4)};
     step_share = std::max(step_share * 0.5, 0.5 / 360.0);
   }
-  end.fine_cost = end.cost;
+  pose.fine_cost = pose.cost;
+  scale.warp(*picture_, pose.misalignment, false, warped_);
+  render(pose.q);
+  const double half_precision = 0.5 / pixel_variance_;
+  for (Eigen::Index i = 0; i < rendered_.size(); ++i) {
+    const double difference = static_cast<double>(rendered_(i) - warped_(i, 0));
+    end.unexplained += std::min(half_precision * difference * difference, most_unexplained);
+  }
   return end;
 }
 

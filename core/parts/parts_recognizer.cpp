@@ -14,7 +14,11 @@ namespace {
 constexpr double window_count = QueryWindows::count;  // each window counts as one observation
 constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
 constexpr std::size_t most_revoted = 3;
-constexpr std::size_t most_covered_poses = 3;
+constexpr std::size_t most_covered_poses = 6;
+/// What votes, visible pixels and unexplained ones count for a covered pose; developed on learned views.
+constexpr double vote_merit = 2.0 * window_count;
+constexpr double visible_merit = 0.15 * window_count;
+constexpr double unexplained_merit = 0.1;
 constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 
@@ -67,7 +71,8 @@ struct PartsRecognizer::Impl {
         aligner([&] {
           options.noise = learned.noise;
           return options;
-        }()) {
+        }()),
+        masked_aligner(options) {
     everything.resize(learned.objects.size());
     std::iota(everything.begin(), everything.end(), std::size_t{0});
   }
@@ -78,6 +83,7 @@ struct PartsRecognizer::Impl {
   PartialMatcher matcher;    ///< of the picture as it is
   PartialMatcher rematcher;  ///< of the picture aligned with one pose
   PoseAligner aligner;
+  MaskedAligner masked_aligner;
   std::vector<std::size_t> everything;
   cv::Mat picture;
   cv::Mat aligned;
@@ -219,17 +225,17 @@ void PartsRecognizer::Impl::find_covered_poses(std::size_t object, const std::ve
   // What the best view trusts is what all poses are compared on.
   foreign_share(object, peaks.front());
   const std::vector<float> trust = pixel_trust();
+  masked_aligner.look(pose_picture, model.poses[object], trust);
   for (const int peak : peaks) {
-    const AlignedPose found = align_masked(pose_picture, model.poses[object], options, trust,
-                                           voted_pose(object, plain, peak), masked_reach);
+    const auto [found, unexplained] = masked_aligner.follow(voted_pose(object, plain, peak), masked_reach);
     PartsPose pose{found.q,
                    found.q_sigma,
                    found.misalignment,
                    found.cost,
                    plain[static_cast<std::size_t>(peak)] / windows.total_weight,
                    0.0};
-    // The noise of a covered region is not known: it is estimated from the residual itself.
-    pose.merit = window_count * (pose.votes - 0.5 * std::log(std::max(found.cost, model.noise)));
+    pose.merit = vote_merit * pose.votes - visible_merit * std::log(std::max(found.cost, model.noise)) -
+                 unexplained_merit * unexplained;
     answer.poses.push_back(std::move(pose));
   }
   std::stable_sort(answer.poses.begin(), answer.poses.end(),
@@ -267,7 +273,7 @@ std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> 
       impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
 }
 
-PartsAnswer PartsRecognizer::settle(std::size_t object) {
+PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   Impl& impl = *impl_;
   PartsAnswer answer;
   answer.object = object;
@@ -280,7 +286,7 @@ PartsAnswer PartsRecognizer::settle(std::size_t object) {
     }
   }
   answer.covered = impl.foreign_share(object, best);
-  if (answer.covered > impl.model.calibration[object].covered_share) {
+  if (covered || answer.covered > impl.model.calibration[object].covered_share) {
     impl.find_covered_poses(object, plain, answer);
   } else {
     impl.find_poses(object, plain, answer);

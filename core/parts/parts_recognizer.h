@@ -20,7 +20,8 @@ struct PartsPose {
   Misalignment misalignment;
   double cost = 0.0;   ///< squared distance in the pose space after alignment
   double votes = 0.0;  ///< share of the windows' weight that votes for this pose, 0…1
-  double merit = 0.0;  ///< log-likelihood up to a constant: votes and distance together
+  double merit = 0.0;  ///< log-likelihood up to a constant: votes and distance together; of covered objects
+                       ///< comparable between objects
 };
 
 /// The answer for one region.
@@ -48,7 +49,8 @@ class PartsRecognizer {
   /// Votes of all objects (or of `shortlist`), most first.
   std::span<const PartialVote> vote(std::span<const std::size_t> shortlist = {});
   /// Pose of one object in the picture looked at, once it has been voted on.
-  PartsAnswer settle(std::size_t object);
+  /// @param covered take it as covered, whatever its windows say: merits of such answers can be compared.
+  PartsAnswer settle(std::size_t object, bool covered = false);
 
  private:
   struct Impl;

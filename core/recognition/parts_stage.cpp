@@ -11,6 +11,10 @@ namespace {
 
 /// The second object gets this share of the first one's votes, or more: which of them it is cannot be said.
 constexpr double tie = 0.97;
+/// Of a covered region, so many objects with this share of the most votes, or more, are looked at pixel by
+/// pixel.
+constexpr std::size_t most_rivals = 4;
+constexpr double rival_votes = 0.8;
 /// A covered object is accepted when no other has more than this share of its votes,
 constexpr double clear_lead = 0.6;
 /// and at most this share of it is covered.
@@ -103,23 +107,32 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
 
 void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
   const auto votes = recognizer_.vote();
-  const double share = votes.size() > 1 && votes[0].score > 0.0F
-                           ? static_cast<double>(votes[1].score) / static_cast<double>(votes[0].score)
-                           : 0.0;
-  const std::optional<PartialVote> second = votes.size() > 1 ? std::optional(votes[1]) : std::nullopt;
-  const PartsAnswer answer = recognizer_.settle(votes[0].object);
+  PartsAnswer answer = recognizer_.settle(votes[0].object);
+  std::optional<PartsAnswer> second;
+  if (answer.covered > model_.parts->calibration[answer.object].covered_share) {
+    // Votes alone do not tell objects that are alike where they are to be seen.
+    for (std::size_t i = 1; i < std::min(most_rivals, votes.size()); ++i) {
+      if (votes[i].score < rival_votes * votes[0].score) break;
+      PartsAnswer other = recognizer_.settle(votes[i].object, true);
+      if (other.poses.front().merit > answer.poses.front().merit) std::swap(other, answer);
+      if (!second || other.poses.front().merit > second->poses.front().merit) second = std::move(other);
+    }
+  }
+  if (!second && votes.size() > 1 && votes[1].score > 0.0F) second = recognizer_.settle(votes[1].object);
+  const auto votes_of = [&](std::size_t object) {
+    return static_cast<double>(std::ranges::find(votes, object, &PartialVote::object)->score);
+  };
   Finding finding;
   finding.object = answer.object;
   finding.poses = answer.poses;
   finding.distance = match_.distance(picture, answer.poses.front().misalignment, answer.object);
   finding.covered = answer.covered;
-  finding.runner_up_share = share;
-  describe(finding, accepted(answer, finding.distance, share), outcome);
-  if (second && second->score > 0.0F) {
-    const PartsAnswer other = recognizer_.settle(second->object);
-    const PartsPose& pose = other.poses.front();
-    outcome.runner_up = {model_.objects[other.object].name, pose.q,
-                         match_.distance(picture, pose.misalignment, other.object).own};
+  if (second) finding.runner_up_share = votes_of(second->object) / std::max(votes_of(answer.object), 1e-9);
+  describe(finding, accepted(answer, finding.distance, finding.runner_up_share), outcome);
+  if (second) {
+    const PartsPose& pose = second->poses.front();
+    outcome.runner_up = {model_.objects[second->object].name, pose.q,
+                         match_.distance(picture, pose.misalignment, second->object).own};
   }
 }
 
