@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t header_size = 512;  ///< HDF5 wants a power of two, at least 512
 constexpr std::string_view magic = "eigenpose model\n";
-constexpr int version = 2;
+constexpr int version = 3;
 
 using Header = std::array<char, header_size>;
 

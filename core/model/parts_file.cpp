@@ -82,6 +82,7 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
   group.write("noise", parts.noise);
   group.write("smallest_rate", parts.smallest_rate);
   group.write("sure_ratio", parts.sure_ratio);
+  group.write("covered_evidence", parts.covered_evidence);
   const Hdf5Group objects = group.make_group("objects");
   for (std::size_t o = 0; o < parts.objects.size(); ++o) {
     const Hdf5Group object = objects.make_group(numbered(o));
@@ -119,6 +120,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
   parts.noise = group.read_double("noise");
   parts.smallest_rate = group.read_double("smallest_rate");
   parts.sure_ratio = group.read_double("sure_ratio");
+  parts.covered_evidence = group.read_double("covered_evidence");
   for (std::size_t o = 0; o < names.size(); ++o) {
     const Hdf5Group object = stored.open_group(names[o]);
     parts.objects.push_back(read_windows(object, parts.scale));

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,8 @@ struct PartsModel {
   /// The whole region settles which object it is when its squared distance is below this times that of the
   /// nearest other object: see calibrate_match.
   double sure_ratio = 0.3;
+  /// A covered region with less evidence is unknown: see covered_calibration.h.
+  double covered_evidence = std::numeric_limits<double>::infinity();
   /// The smallest rate of wrong rejections that the number of learned views can support, 1/(n + 1).
   double smallest_rate = 1.0;
 

@@ -19,6 +19,15 @@ constexpr std::size_t most_covered_poses = 6;
 constexpr double vote_merit = 2.0 * window_count;
 constexpr double visible_merit = 0.15 * window_count;
 constexpr double unexplained_merit = 0.1;
+/// Of a covered region, so many objects with this share of the most votes, or more, are looked at pixel by
+/// pixel.
+constexpr std::size_t most_rivals = 4;
+constexpr double rival_votes = 0.8;
+/// A second object with this share of the votes, or with so much less merit, may be it as well.
+constexpr double tied_votes = 0.97;
+constexpr double tied_merit = 2.0;
+/// What votes of the visible windows, over those of the background, weigh beside the logarithm of the cost.
+constexpr double vote_evidence = 5.0;
 constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 
@@ -292,6 +301,39 @@ PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
     impl.find_poses(object, plain, answer);
   }
   return answer;
+}
+
+PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist) {
+  const Impl& impl = *impl_;
+  const auto votes = vote(shortlist);
+  PartsIdentification found;
+  found.best = settle(votes[0].object);
+  const bool covered = found.best.covered > impl.model.calibration[found.best.object].covered_share;
+  if (covered) {
+    for (std::size_t i = 1; i < std::min(most_rivals, votes.size()); ++i) {
+      if (votes[i].score < rival_votes * votes[0].score) break;
+      PartsAnswer other = settle(votes[i].object, true);
+      const auto merit = [](const PartsAnswer& answer) { return answer.poses.front().merit; };
+      if (merit(other) > merit(found.best)) std::swap(other, found.best);
+      if (!found.second || merit(other) > merit(*found.second)) found.second = std::move(other);
+    }
+  }
+  if (!found.second && votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);
+  const auto votes_for = [&](const PartsAnswer& answer) {
+    return static_cast<double>(std::ranges::find(votes, answer.object, &PartialVote::object)->score);
+  };
+  const double own = std::max(votes_for(found.best), 1e-9);
+  if (found.second) found.second_share = votes_for(*found.second) / own;
+  if (covered) {
+    const PartsPose& pose = found.best.poses.front();
+    found.tie = found.second && found.second->poses.front().merit > pose.merit - tied_merit;
+    found.evidence =
+        vote_evidence * own / (impl.windows.total_weight * std::max(1.0 - found.best.covered, 0.1)) -
+        std::log(std::max(pose.cost, impl.model.noise)) - found.second_share;
+  } else {
+    found.tie = found.second_share > tied_votes;
+  }
+  return found;
 }
 
 }  // namespace eigenpose

@@ -27,11 +27,20 @@ struct PartsPose {
 /// The answer for one region.
 struct PartsAnswer {
   std::size_t object = 0;
-  std::optional<std::size_t> runner_up;
-  double runner_up_share = 0.0;  ///< votes of the second object over those of the first, 0…1
   std::vector<PartsPose> poses;  ///< of `object`, best first, never empty
   double score = 1.0;            ///< 1 − votes of the best pose; compare with the object's rejection score
   double covered = 0.0;          ///< share of the windows' weight that does not belong to the object, 0…1
+};
+
+/// Which object the windows show.
+struct PartsIdentification {
+  PartsAnswer best;
+  std::optional<PartsAnswer> second;  ///< the next object
+  double second_share = 0.0;          ///< its votes over those of the best, ≥ 0
+  /// Where the best is covered: how much speaks for it that is hardly seen of strangers. Compare with the
+  /// model's covered_evidence.
+  double evidence = 0.0;
+  bool tie = false;  ///< which of the two it is cannot be said
 };
 
 /// Recognises normalised regions. Holds scratch memory: one thread at a time; the model outlives it.
@@ -51,6 +60,9 @@ class PartsRecognizer {
   /// Pose of one object in the picture looked at, once it has been voted on.
   /// @param covered take it as covered, whatever its windows say: merits of such answers can be compared.
   PartsAnswer settle(std::size_t object, bool covered = false);
+  /// Votes and settles. Objects that are alike where a covered region is to be seen are told apart pixel by
+  /// pixel.
+  PartsIdentification identify(std::span<const std::size_t> shortlist = {});
 
  private:
   struct Impl;

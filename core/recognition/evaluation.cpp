@@ -92,16 +92,17 @@ void count(EvaluationReport& report, ObjectEvaluation& object, const Answer& ans
 
 /// The model without one of its objects, whose views have no part in the thresholds either.
 std::shared_ptr<const Model> without_object(const Model& model, std::size_t object,
-                                            const std::vector<MatchEvidence>& evidence,
+                                            const LearningReport& learning,
                                             const MatchCalibrationOptions& options) {
   auto rest = std::make_shared<Model>(model);
   const auto at = static_cast<std::ptrdiff_t>(object);
   rest->objects.erase(rest->objects.begin() + at);
   if (model.parts) {
     auto parts = std::make_shared<PartsModel>(*model.parts);
-    const MatchThresholds thresholds = match_thresholds(evidence, options, object);
+    const MatchThresholds thresholds = match_thresholds(learning.match, options, object);
     parts->sure_ratio = thresholds.sure_ratio;
-    for (std::size_t o = 0; o < evidence.size(); ++o) {
+    parts->covered_evidence = covered_threshold(learning.covered, options.stranger_rate, object);
+    for (std::size_t o = 0; o < learning.match.size(); ++o) {
       PartsCalibration& own = parts->calibration[o];
       own.rejection_distance = thresholds.rejection_distance[o];
       own.sure_distance = std::min(own.sure_distance, own.rejection_distance);
@@ -124,8 +125,7 @@ void show_strangers(const std::shared_ptr<const Model>& model, std::span<const I
   std::vector<std::size_t> shown(sets.size(), 0);
   std::atomic<std::size_t> done = 0;
   parallel_for(sets.size(), options.threads, [&](std::size_t s) {
-    Worker worker(without_object(*model, s, report.learning.match, options.learning.match),
-                  options.recognizer);
+    Worker worker(without_object(*model, s, report.learning, options.learning.match), options.recognizer);
     for (std::size_t i = 0; i < tests.size(); ++i) {
       if (tests[i].set != s) continue;
       if (stop.stop_requested()) throw Interrupted();

@@ -161,6 +161,10 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
           std::min(match.rejection_distance[o], sure_scales * told.match[o].scale);
       parts->calibration[o].typical_distance = told.match[o].typical_distance;
     }
+    CoveredCalibrationOptions covered_options;
+    covered_options.threads = options.threads;
+    told.covered = measure_covered(*parts, pictures, covered_options, progress, stop);
+    parts->covered_evidence = covered_threshold(told.covered, options.match.stranger_rate);
     told.parts_time = watch.lap();
   }
   model.provenance = {options.program_version, utc_now(), options.image_sets, told.solver.solver,

@@ -9,6 +9,7 @@
 
 #include "core/base/progress.h"
 #include "core/model/model.h"
+#include "core/parts/covered_calibration.h"
 #include "core/parts/parts_calibration.h"
 #include "core/recognition/match_calibration.h"
 #include "core/recognition/rejection.h"
@@ -46,6 +47,7 @@ struct LearningReport {
   SolverReport solver;
   std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
   std::vector<MatchEvidence> match;         ///< the same of the aligned match; empty without parts
+  std::vector<CoveredEvidence> covered;  ///< learned views as strangers to the windows; empty without parts
   Duration normalize_time{};
   Duration eigenspace_time{};
   Duration manifold_time{};

@@ -5,20 +5,11 @@
 #include <limits>
 
 #include "core/image/normalization.h"
+#include "core/parts/covered_calibration.h"
 
 namespace eigenpose {
 namespace {
 
-/// The second object gets this share of the first one's votes, or more: which of them it is cannot be said.
-constexpr double tie = 0.97;
-/// Of a covered region, so many objects with this share of the most votes, or more, are looked at pixel by
-/// pixel.
-constexpr std::size_t most_rivals = 4;
-constexpr double rival_votes = 0.8;
-/// A covered object is accepted when no other has more than this share of its votes,
-constexpr double clear_lead = 0.6;
-/// and at most this share of it is covered.
-constexpr double most_covered = 0.5;
 /// Poses this much less likely than the best (natural logarithm) are not worth telling: a factor of 20.
 constexpr double likely_pose = 3.0;
 /// Another pose this much less likely leaves no doubt of the best.
@@ -43,18 +34,14 @@ PartsStage::PartsStage(const Model& model, const ManifoldSearch& search)
       picture_(model.normalization.size, model.normalization.size,
                picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
-bool PartsStage::accepted(const PartsAnswer& answer, const RealignedDistance& distance,
-                          double runner_up_share) const {
-  const PartsCalibration& calibration = model_.parts->calibration[answer.object];
+bool PartsStage::accepted(const PartsIdentification& found, const RealignedDistance& distance) const {
+  const PartsAnswer& best = found.best;
+  const PartsCalibration& calibration = model_.parts->calibration[best.object];
   if (distance.own <= calibration.sure_distance) return true;
-  if (distance.own <= calibration.rejection_distance && answer.score <= calibration.rejection_score)
+  if (distance.own <= calibration.rejection_distance && best.score <= calibration.rejection_score)
     return true;
-  if (answer.covered <= calibration.covered_share || answer.covered > most_covered ||
-      runner_up_share > clear_lead)
-    return false;
-  // What is covered cannot vote: the rest must be as good as a whole region's.
-  const double rest = (answer.score - answer.covered) / (1.0 - answer.covered);
-  return rest <= calibration.rejection_score;
+  return best.covered > calibration.covered_share && best.covered <= most_covered &&
+         found.evidence > model_.parts->covered_evidence;
 }
 
 bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<const double> b) const {
@@ -106,33 +93,20 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
 }
 
 void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
-  const auto votes = recognizer_.vote();
-  PartsAnswer answer = recognizer_.settle(votes[0].object);
-  std::optional<PartsAnswer> second;
-  if (answer.covered > model_.parts->calibration[answer.object].covered_share) {
-    // Votes alone do not tell objects that are alike where they are to be seen.
-    for (std::size_t i = 1; i < std::min(most_rivals, votes.size()); ++i) {
-      if (votes[i].score < rival_votes * votes[0].score) break;
-      PartsAnswer other = recognizer_.settle(votes[i].object, true);
-      if (other.poses.front().merit > answer.poses.front().merit) std::swap(other, answer);
-      if (!second || other.poses.front().merit > second->poses.front().merit) second = std::move(other);
-    }
-  }
-  if (!second && votes.size() > 1 && votes[1].score > 0.0F) second = recognizer_.settle(votes[1].object);
-  const auto votes_of = [&](std::size_t object) {
-    return static_cast<double>(std::ranges::find(votes, object, &PartialVote::object)->score);
-  };
+  const PartsIdentification found = recognizer_.identify();
+  const PartsAnswer& best = found.best;
   Finding finding;
-  finding.object = answer.object;
-  finding.poses = answer.poses;
-  finding.distance = match_.distance(picture, answer.poses.front().misalignment, answer.object);
-  finding.covered = answer.covered;
-  if (second) finding.runner_up_share = votes_of(second->object) / std::max(votes_of(answer.object), 1e-9);
-  describe(finding, accepted(answer, finding.distance, finding.runner_up_share), outcome);
-  if (second) {
-    const PartsPose& pose = second->poses.front();
-    outcome.runner_up = {model_.objects[second->object].name, pose.q,
-                         match_.distance(picture, pose.misalignment, second->object).own};
+  finding.object = best.object;
+  finding.poses = best.poses;
+  finding.distance = match_.distance(picture, best.poses.front().misalignment, best.object);
+  finding.covered = best.covered;
+  finding.runner_up_share = found.second_share;
+  finding.tie = found.tie;
+  describe(finding, accepted(found, finding.distance), outcome);
+  if (found.second) {
+    const PartsPose& pose = found.second->poses.front();
+    outcome.runner_up = {model_.objects[found.second->object].name, pose.q,
+                         match_.distance(picture, pose.misalignment, found.second->object).own};
   }
 }
 
@@ -159,7 +133,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
     outcome.confidence = 0.0;
     return;
   }
-  outcome.verdict = finding.runner_up_share > tie ? Verdict::ambiguous : Verdict::recognized;
+  outcome.verdict = finding.tie ? Verdict::ambiguous : Verdict::recognized;
   if (finding.runner_up_share > 0.0) {
     outcome.confidence =
         std::clamp((1.0 - finding.covered) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);

@@ -41,14 +41,14 @@ class PartsStage {
     RealignedDistance distance;
     double covered = 0.0;
     double runner_up_share = 0.0;  ///< of votes; 0 where the whole region settled it
+    bool tie = false;
   };
 
   /// The whole region alone. True when it left no doubt, and `outcome` is filled.
   bool settle(std::span<const float> picture, std::size_t object, Outcome& outcome);
   void vote(std::span<const float> picture, Outcome& outcome);
   void describe(const Finding& finding, bool accepted, Outcome& outcome) const;
-  [[nodiscard]] bool accepted(const PartsAnswer& answer, const RealignedDistance& distance,
-                              double runner_up_share) const;
+  [[nodiscard]] bool accepted(const PartsIdentification& found, const RealignedDistance& distance) const;
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 
   const Model& model_;

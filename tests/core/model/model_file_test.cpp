@@ -116,11 +116,11 @@ TEST_F(ModelFile, RefusesAFileCutOffOrContinuedAnywhere) {
 TEST_F(ModelFile, SaysWhatToDoAboutAnotherVersion) {
   auto bytes = read_file(file());
   const std::string text(bytes.begin(), bytes.begin() + 100);
-  const auto at = text.find("version 2");
+  const auto at = text.find("version 3");
   ASSERT_NE(at, std::string::npos);
   bytes[at + 8] = '9';
   write(bytes);
-  EXPECT_THAT(refusal(), HasSubstr("version 9, this program reads version 2; learn it again"));
+  EXPECT_THAT(refusal(), HasSubstr("version 9, this program reads version 3; learn it again"));
 }
 
 TEST_F(ModelFile, RefusesWhatIsNoModel) {

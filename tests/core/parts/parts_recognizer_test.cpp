@@ -1,7 +1,11 @@
 #include "core/parts/parts_recognizer.h"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
+#include "core/parts/covered_calibration.h"
+#include "core/parts/parts_calibration.h"
 #include "tests/core/parts/pictures.h"
 
 namespace eigenpose {
@@ -44,6 +48,66 @@ TEST(PartsRecognizer, FindsAnObjectOfWhichAFifthIsCovered) {
     EXPECT_GT(answer.covered, 0.1);
     EXPECT_LT(test::turn_error(answer.poses.front().q[0], truth), 4.0);
   }
+}
+
+TEST(PartsRecognizer, FollowsThePoseOfACoveredObjectWhateverTheCoverLooksLike) {
+  PartsRecognizer recognizer(model());
+  for (const int brightness : {0, 90, 255}) {
+    for (unsigned o = 0; o < objects; ++o) {
+      const double truth = 52.0 + 50.0 * o;
+      cv::Mat picture = test::DrawnObject(20 + o).view(truth);
+      picture(cv::Rect(8, 18, 24, 24)).setTo(brightness);
+      recognizer.look(picture);
+      const PartsIdentification found = recognizer.identify();
+      ASSERT_EQ(found.best.object, o) << "under a cover of brightness " << brightness;
+      EXPECT_FALSE(found.tie);
+      EXPECT_LT(test::turn_error(found.best.poses.front().q[0], truth), 4.0)
+          << "object " << o << " under a cover of brightness " << brightness;
+    }
+  }
+}
+
+TEST(PartsRecognizer, MoreSpeaksForACoveredObjectThanForStrangers) {
+  std::vector<PartsViews> views;
+  for (unsigned o = 0; o < objects; ++o)
+    views.push_back(test::turntable_views(test::DrawnObject(20 + o), 15.0));
+  PartsModel learned = model();
+  calibrate_parts(learned, views, {});
+  const double threshold = covered_threshold(measure_covered(learned, views, {}), 0.1);
+  PartsRecognizer recognizer(learned);
+  const auto accepted = [&](cv::Mat picture) {
+    picture(cv::Rect(8, 18, 24, 24)).setTo(0);
+    recognizer.look(picture);
+    const PartsIdentification found = recognizer.identify();
+    return found.best.covered > learned.calibration[found.best.object].covered_share &&
+           found.best.covered <= most_covered && found.evidence > threshold;
+  };
+  int known = 0;
+  int strangers = 0;
+  constexpr int shown = 20;
+  for (int i = 0; i < shown; ++i) {
+    known +=
+        accepted(test::DrawnObject(20 + static_cast<unsigned>(i % objects)).view(52.0 + 17.0 * i)) ? 1 : 0;
+    strangers += accepted(test::DrawnObject(60 + static_cast<unsigned>(i)).view(52.0 + 17.0 * i)) ? 1 : 0;
+  }
+  EXPECT_GE(known, shown / 2);
+  EXPECT_LE(strangers, known / 2);
+}
+
+TEST(CoveredThreshold, IsConformalAndForgetsTheObjectLeftOut) {
+  const std::vector<CoveredEvidence> strangers = {{0, 1, 5.0}, {1, 0, 9.0}, {2, 1, 3.0}, {2, 0, 7.0}};
+  // One of five, counting the new one, is the largest.
+  EXPECT_EQ(covered_threshold(strangers, 0.2), 9.0);
+  EXPECT_EQ(covered_threshold(strangers, 0.4), 7.0);
+  EXPECT_EQ(covered_threshold(strangers, 0.001), 9.0)
+      << "four strangers support no smaller rate than a fifth";
+  EXPECT_EQ(covered_threshold(strangers, 0.25, 0), 3.0);
+  EXPECT_EQ(covered_threshold({}, 0.1), std::numeric_limits<double>::infinity());
+}
+
+TEST(CoveredCalibration, NeedsTwoObjects) {
+  PartsModel one;
+  EXPECT_TRUE(measure_covered(one, std::vector<PartsViews>(1), {}).empty());
 }
 
 TEST(PartsRecognizer, GivesAStrangerAWorseScoreThanAKnownObject) {
