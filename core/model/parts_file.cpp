@@ -68,6 +68,28 @@ PartsObject read_windows(const Hdf5Group& group, const WindowScale& scale) {
   return object;
 }
 
+/// 2 × views; one column of zeros where there are none.
+Eigen::MatrixXd extents_matrix(const std::vector<cv::Size>& extents) {
+  Eigen::MatrixXd matrix =
+      Eigen::MatrixXd::Zero(2, std::max<Eigen::Index>(1, static_cast<Eigen::Index>(extents.size())));
+  for (std::size_t v = 0; v < extents.size(); ++v)
+    matrix.col(static_cast<Eigen::Index>(v)) << extents[v].width, extents[v].height;
+  return matrix;
+}
+
+std::vector<cv::Size> read_extents(const Eigen::MatrixXd& matrix, const PartsObject& object) {
+  if (matrix.rows() == 2 && matrix.cols() == 1 && matrix.isZero()) return {};
+  const auto views = std::count_if(object.candidates.begin(), object.candidates.end(),
+                                   [](const Candidate& candidate) { return !candidate.mirrored; });
+  if (matrix.rows() != 2 || matrix.cols() != views || !(matrix.minCoeff() >= 1.0) ||
+      !(matrix.maxCoeff() <= 1e5))
+    throw Hdf5Failure("has views of sizes that cannot be");
+  std::vector<cv::Size> extents;
+  for (Eigen::Index v = 0; v < matrix.cols(); ++v)
+    extents.emplace_back(static_cast<int>(matrix(0, v)), static_cast<int>(matrix(1, v)));
+  return extents;
+}
+
 }  // namespace
 
 void write_parts(const Hdf5Group& group, const PartsModel& parts) {
@@ -93,6 +115,8 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
     object.write("rejection_score", parts.calibration[o].rejection_score);
     object.write("typical_score", parts.calibration[o].typical_score);
     object.write("covered_share", parts.calibration[o].covered_share);
+    object.write("extents",
+                 extents_matrix(o < parts.extents.size() ? parts.extents[o] : std::vector<cv::Size>()));
     const PoseSpace& pose = parts.poses[o];
     object.write("pixel_mean", Eigen::MatrixXf(pose.pixel_mean()));
     write_scale(object.make_group("coarse"), pose.coarse(), pose.coarse_manifold());
@@ -132,6 +156,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
     calibration.typical_score = object.read_double("typical_score");
     calibration.covered_share = object.read_double("covered_share");
     parts.calibration.push_back(calibration);
+    parts.extents.push_back(read_extents(object.read_doubles("extents"), parts.objects.back()));
     const Hdf5Group coarse = object.open_group("coarse");
     const Hdf5Group fine = object.open_group("fine");
     parts.poses.push_back(PoseSpace::from_parts(

@@ -14,6 +14,10 @@
 namespace eigenpose {
 namespace {
 
+/// Few strangers may show nothing that would be taken for a covered object; so much is asked for all the
+/// same.
+constexpr double least_evidence = 4.0;
+
 /// Hides a square of the picture, a different one for each seed.
 void cover(cv::Mat& picture, std::size_t seed) {
   constexpr double share = 0.2;
@@ -79,7 +83,7 @@ double covered_threshold(std::span<const CoveredEvidence> strangers, double stra
   std::sort(evidence.begin(), evidence.end(), std::greater<>());
   // Conformal: a new stranger exceeds the k-th largest of n with probability k/(n + 1) at most.
   const auto rank = static_cast<std::size_t>(stranger_rate * static_cast<double>(evidence.size() + 1));
-  return evidence[std::min(std::max<std::size_t>(rank, 1), evidence.size()) - 1];
+  return std::max(least_evidence, evidence[std::min(std::max<std::size_t>(rank, 1), evidence.size()) - 1]);
 }
 
 }  // namespace eigenpose

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 #include "core/parts/partial_match.h"
 #include "core/parts/pose_space.h"
 #include "core/parts/windows.h"
@@ -40,6 +42,9 @@ struct PartsModel {
   std::vector<PartsObject> objects;
   std::vector<PoseSpace> poses;               ///< one an object
   std::vector<PartsCalibration> calibration;  ///< one an object
+  /// For each object the size of the region that each learned view was cut out of, pixels; empty where views
+  /// came ready-cut. Tells objects apart that touch, as long as the camera stays where it was.
+  std::vector<std::vector<cv::Size>> extents;
 
   /// The whole region settles which object it is when its squared distance is below this times that of the
   /// nearest other object: see calibrate_match.

@@ -282,6 +282,10 @@ std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> 
       impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
 }
 
+double PartsRecognizer::total_weight() const {
+  return impl_->windows.total_weight;
+}
+
 PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   Impl& impl = *impl_;
   PartsAnswer answer;
@@ -303,12 +307,12 @@ PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   return answer;
 }
 
-PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist) {
+PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist, bool covered) {
   const Impl& impl = *impl_;
   const auto votes = vote(shortlist);
   PartsIdentification found;
-  found.best = settle(votes[0].object);
-  const bool covered = found.best.covered > impl.model.calibration[found.best.object].covered_share;
+  found.best = settle(votes[0].object, covered);
+  covered = covered || found.best.covered > impl.model.calibration[found.best.object].covered_share;
   if (covered) {
     for (std::size_t i = 1; i < std::min(most_rivals, votes.size()); ++i) {
       if (votes[i].score < rival_votes * votes[0].score) break;
@@ -318,7 +322,8 @@ PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> short
       if (!found.second || merit(other) > merit(*found.second)) found.second = std::move(other);
     }
   }
-  if (!found.second && votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);
+  if (!found.second && votes.size() > 1 && votes[1].score > 0.0F)
+    found.second = settle(votes[1].object, covered);
   const auto votes_for = [&](const PartsAnswer& answer) {
     return static_cast<double>(std::ranges::find(votes, answer.object, &PartialVote::object)->score);
   };

@@ -57,12 +57,15 @@ class PartsRecognizer {
   [[nodiscard]] const PosePicture& pose_picture() const;
   /// Votes of all objects (or of `shortlist`), most first.
   std::span<const PartialVote> vote(std::span<const std::size_t> shortlist = {});
+  /// Weight of all windows of the picture looked at, once it has been voted on.
+  [[nodiscard]] double total_weight() const;
   /// Pose of one object in the picture looked at, once it has been voted on.
   /// @param covered take it as covered, whatever its windows say: merits of such answers can be compared.
   PartsAnswer settle(std::size_t object, bool covered = false);
   /// Votes and settles. Objects that are alike where a covered region is to be seen are told apart pixel by
   /// pixel.
-  PartsIdentification identify(std::span<const std::size_t> shortlist = {});
+  /// @param covered take all of them as covered.
+  PartsIdentification identify(std::span<const std::size_t> shortlist = {}, bool covered = false);
 
  private:
   struct Impl;

@@ -110,6 +110,7 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
     parts->objects.erase(parts->objects.begin() + at);
     parts->poses.erase(parts->poses.begin() + at);
     parts->calibration.erase(parts->calibration.begin() + at);
+    if (!parts->extents.empty()) parts->extents.erase(parts->extents.begin() + at);
     rest->parts = std::move(parts);
   }
   return rest;

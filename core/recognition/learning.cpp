@@ -149,6 +149,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     options.calibration.threads = options.threads;
     options.match.threads = options.threads;
     const auto parts = std::make_shared<PartsModel>(learn_parts(pictures, parts_options, progress, stop));
+    for (const ObjectViews& object : views.objects()) parts->extents.push_back(object.extents);
     calibrate_parts(*parts, pictures, options.calibration, progress, stop);
     model.parts = parts;
     told.match = measure_match(model, views, points, options.match, progress, stop);

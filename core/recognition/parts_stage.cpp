@@ -31,6 +31,7 @@ PartsStage::PartsStage(const Model& model, const ManifoldSearch& search)
     : model_(model),
       recognizer_(*model.parts),
       match_(model, search, reach_of_others(model)),
+      fused_(model.normalization, *model.parts, recognizer_),
       picture_(model.normalization.size, model.normalization.size,
                picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
@@ -94,15 +95,32 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
 
 void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
   const PartsIdentification found = recognizer_.identify();
-  const PartsAnswer& best = found.best;
+  const RealignedDistance distance =
+      match_.distance(picture, found.best.poses.front().misalignment, found.best.object);
+  describe(found, distance, accepted(found, distance), picture, outcome);
+}
+
+std::span<const FusedObject> PartsStage::take_apart(const cv::Mat& cut, const Background& background) {
+  if (!fused_.possible(cut.size())) return {};
+  return fused_.take_apart(cut, background);
+}
+
+void PartsStage::describe(const FusedObject& object, Outcome& outcome) {
+  const PartsAnswer& best = object.found.best;
+  describe(object.found, match_.distance(object.picture, best.poses.front().misalignment, best.object), true,
+           object.picture, outcome);
+}
+
+void PartsStage::describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
+                          std::span<const float> picture, Outcome& outcome) {
   Finding finding;
-  finding.object = best.object;
-  finding.poses = best.poses;
-  finding.distance = match_.distance(picture, best.poses.front().misalignment, best.object);
-  finding.covered = best.covered;
+  finding.object = found.best.object;
+  finding.poses = found.best.poses;
+  finding.distance = distance;
+  finding.covered = found.best.covered;
   finding.runner_up_share = found.second_share;
   finding.tie = found.tie;
-  describe(finding, accepted(found, finding.distance), outcome);
+  describe(finding, accepted, outcome);
   if (found.second) {
     const PartsPose& pose = found.second->poses.front();
     outcome.runner_up = {model_.objects[found.second->object].name, pose.q,

@@ -13,6 +13,7 @@
 #include "core/model/model.h"
 #include "core/parts/parts_recognizer.h"
 #include "core/recognition/aligned_match.h"
+#include "core/recognition/fused_region.h"
 #include "core/recognition/outcome.h"
 
 namespace eigenpose {
@@ -32,6 +33,11 @@ class PartsStage {
   /// Fills everything of `outcome` but its box.
   /// @param picture as the normaliser makes it. @param nearest the object whose manifold is nearest.
   void judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome);
+  /// A region that `judge` did not know: the objects that make it up, where they touch or overlap. None when
+  /// that cannot be said. @param cut the region's pixels. Valid until the next call.
+  std::span<const FusedObject> take_apart(const cv::Mat& cut, const Background& background);
+  /// Fills everything of `outcome` but its box.
+  void describe(const FusedObject& object, Outcome& outcome);
 
  private:
   /// One pose of one object, wherever it was found.
@@ -47,6 +53,8 @@ class PartsStage {
   /// The whole region alone. True when it left no doubt, and `outcome` is filled.
   bool settle(std::span<const float> picture, std::size_t object, Outcome& outcome);
   void vote(std::span<const float> picture, Outcome& outcome);
+  void describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
+                std::span<const float> picture, Outcome& outcome);
   void describe(const Finding& finding, bool accepted, Outcome& outcome) const;
   [[nodiscard]] bool accepted(const PartsIdentification& found, const RealignedDistance& distance) const;
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
@@ -54,6 +62,7 @@ class PartsStage {
   const Model& model_;
   PartsRecognizer recognizer_;
   AlignedMatch match_;
+  FusedRegion fused_;
   cv::Mat picture_;
   std::vector<PartsPose> poses_;
 };

@@ -103,6 +103,8 @@ struct Recognizer::Impl {
   /// is seen best.
   void look_again();
   void judge(Outcome& outcome);
+  /// Puts the objects of a fused region in the place of the last outcome.
+  void take_apart(const cv::Mat& image, std::size_t region);
   void estimate_pose(Outcome& outcome, const ClosestPoint& best);
 
   Outcome& next_outcome();
@@ -225,6 +227,19 @@ void Recognizer::Impl::judge(Outcome& outcome) {
   }
 }
 
+void Recognizer::Impl::take_apart(const cv::Mat& image, std::size_t region) {
+  if (model->normalization.cropped) return;
+  const auto found = parts->take_apart(segmenter.cut_out(image, region), segmenter.background());
+  if (found.empty()) return;
+  const cv::Rect frame(0, 0, image.cols, image.rows);
+  const cv::Point corner = outcomes[--outcome_count].box.tl();
+  for (const FusedObject& object : found) {
+    Outcome& outcome = next_outcome();
+    outcome.box = (object.box + corner) & frame;
+    parts->describe(object, outcome);
+  }
+}
+
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
   const ModelObject& object = model->objects[best.manifold];
   const double sigma = std::max(best.distance, object.typical_distance) / std::sqrt(effective_dimensions);
@@ -324,6 +339,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
       impl.find_closest();
       if (impl.parts) {
         impl.parts->judge(impl.picture(), impl.closest[0].manifold, outcome);
+        if (outcome.verdict == Verdict::unknown) impl.take_apart(image, i);
       } else {
         impl.look_again();
         impl.judge(outcome);

@@ -98,7 +98,7 @@ void kept_numbers(std::span<const std::uint8_t> bytes, bool range, std::span<flo
 }  // namespace
 
 float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segmenter, Normalizer& normalizer,
-                             std::span<float> picture) {
+                             std::span<float> picture, cv::Size* extent) {
   float energy = 0.0F;
   if (cropped) {
     energy = normalizer.normalize(image, {0, 0, 0}, picture);
@@ -113,6 +113,7 @@ float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segm
       throw Error(
           "shows the object cut off by the border of the picture; move the camera back or the object in");
     const auto index = static_cast<std::size_t>(largest - regions.begin());
+    if (extent != nullptr) *extent = largest->box.size();
     energy = normalizer.normalize(segmenter.cut_out(image, index), segmenter.background().level, picture);
   }
   if (!(energy > 0.0F)) throw Error("is black; light the object better or remove the view");
@@ -143,8 +144,8 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
     std::vector<std::vector<double>> poses;
     for (const std::size_t i : chosen) poses.push_back(views.at(i).q);
     PoseGrid grid = find_pose_grid(set.images->workspace(), poses, set.images->object());
-    objects_.push_back(
-        {set.images->object(), set.images->workspace(), std::move(grid.axes), jobs.size(), chosen.size()});
+    objects_.push_back({set.images->object(), set.images->workspace(), std::move(grid.axes), jobs.size(),
+                        chosen.size(), std::vector<cv::Size>(options_.cropped ? 0 : chosen.size())});
     for (const std::size_t place : grid.order) jobs.push_back({set.images, chosen[place]});
   }
 
@@ -176,8 +177,13 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
                                 first.text() + "; all views of an object must be alike: acquire it again");
     auto scratch = pool.take();
     try {
+      cv::Size extent;
       normalize_learned_view(image, job.images->cropped(), scratch->segmenter, scratch->normalizer,
-                             scratch->picture);
+                             scratch->picture, &extent);
+      if (!options_.cropped) {
+        ObjectViews& object = objects_[object_of[i]];
+        object.extents[i - object.first] = extent;
+      }
       keep(scratch->picture, range, scratch->bytes);
       kept_numbers(scratch->bytes, range, scratch->picture);
       energies_[i] = scratch->maker.make(scratch->picture, scratch->appearance);

@@ -35,6 +35,8 @@ struct ObjectViews {
   std::vector<SampleAxis> axes;
   std::size_t first = 0;  ///< its first view in the store
   std::size_t count = 0;  ///< n₁·…·n_m
+  /// Size of the region that each view was cut out of, pixels; empty where pictures came ready-cut.
+  std::vector<cv::Size> extents;
 };
 
 /// How views are made and kept.
@@ -93,9 +95,10 @@ class ViewStore final : public AppearanceSource {
 void picture_numbers(const cv::Mat& picture, std::span<float> numbers);
 
 /// Cuts the one object out of a learned view and normalises it.
-/// @param picture picture_length(options) numbers. @return its energy. @throws Error saying what is wrong
-/// with the picture (nothing stands out, it touches the border).
+/// @param picture picture_length(options) numbers. @param extent where to put the size of the region, or
+/// nullptr. @return its energy. @throws Error saying what is wrong with the picture (nothing stands out, it
+/// touches the border).
 float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segmenter, Normalizer& normalizer,
-                             std::span<float> picture);
+                             std::span<float> picture, cv::Size* extent = nullptr);
 
 }  // namespace eigenpose

@@ -1,0 +1,286 @@
+#include "core/recognition/fused_region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/parts/covered_calibration.h"
+
+namespace eigenpose {
+namespace {
+
+/// Learned sizes that differ by less than this share of the larger side are tried as one.
+constexpr double same_extent = 0.06;
+constexpr std::size_t most_extents = 64;  ///< where there are more, sizes are told apart less finely
+/// An object may reach beyond what is seen of it by this share of its side: so much may be covered.
+constexpr double most_beyond = 0.35;
+constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
+constexpr std::size_t most_first = 3;   ///< of them, those that are followed to the end
+constexpr std::size_t most_objects = 4;
+constexpr double least_remainder = 0.12;  ///< of the region's pixels: less is outline
+constexpr double least_explained = 0.85;
+constexpr double plainly_explained = 0.97;  ///< no other first object is tried
+/// What others leave in an object's picture costs evidence while they are being found, and some of it even
+/// with them taken out.
+constexpr double search_slack = 3.0;
+constexpr double most_left_over = 0.1;  ///< what is covered by more than this gets no slack in the end
+constexpr double final_slack = 1.5;
+constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
+
+cv::Scalar level_of(const Background& background) {
+  return {static_cast<double>(background.level[0]), static_cast<double>(background.level[1]),
+          static_cast<double>(background.level[2])};
+}
+
+cv::Mat foreground_of(const cv::Mat& cut, const Background& background) {
+  cv::Mat brightest;
+  if (cut.channels() == 3) {
+    std::vector<cv::Mat> bands;
+    cv::split(cut, bands);
+    brightest = cv::max(cv::max(bands[0], bands[1]), bands[2]);
+  } else {
+    brightest = cut;
+  }
+  cv::Mat mask = brightest > background.threshold;
+  // Dark spots of an object are part of it.
+  cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, cv::Mat::ones(7, 7, CV_8U));
+  return mask;
+}
+
+/// The box of the largest piece, and how many pixels all pieces have.
+cv::Rect largest_piece(const cv::Mat& mask, int& area) {
+  cv::Mat labels;
+  cv::Mat stats;
+  cv::Mat centres;
+  const int count = cv::connectedComponentsWithStats(mask, labels, stats, centres);
+  area = 0;
+  int best = 0;
+  for (int i = 1; i < count; ++i) {
+    area += stats.at<int>(i, cv::CC_STAT_AREA);
+    if (best == 0 || stats.at<int>(i, cv::CC_STAT_AREA) > stats.at<int>(best, cv::CC_STAT_AREA)) best = i;
+  }
+  if (best == 0) return {};
+  return {stats.at<int>(best, cv::CC_STAT_LEFT), stats.at<int>(best, cv::CC_STAT_TOP),
+          stats.at<int>(best, cv::CC_STAT_WIDTH), stats.at<int>(best, cv::CC_STAT_HEIGHT)};
+}
+
+}  // namespace
+
+FusedRegion::FusedRegion(const NormalizationOptions& normalization, const PartsModel& parts,
+                         PartsRecognizer& recognizer)
+    : normalization_(normalization),
+      parts_(parts),
+      recognizer_(recognizer),
+      normalizer_(normalization),
+      least_(std::numeric_limits<int>::max(), std::numeric_limits<int>::max()),
+      picture_(normalization.size, normalization.size,
+               picture_bands(normalization) == 3 ? CV_8UC3 : CV_8UC1) {
+  for (double same = same_extent; extents_.empty() || extents_.size() > most_extents; same *= 1.3) {
+    extents_.clear();
+    group_extents(same);
+    if (extents_.empty()) break;
+  }
+}
+
+void FusedRegion::group_extents(double same) {
+  for (std::size_t o = 0; o < parts_.extents.size(); ++o) {
+    for (const cv::Size& size : parts_.extents[o]) {
+      least_ = {std::min(least_.width, size.width), std::min(least_.height, size.height)};
+      const double side = std::max(size.width, size.height);
+      const auto like = std::ranges::find_if(extents_, [&](const Extent& known) {
+        return std::abs(known.size.width - size.width) < same * side &&
+               std::abs(known.size.height - size.height) < same * side;
+      });
+      Extent& extent = like != extents_.end() ? *like : extents_.emplace_back(Extent{size, {}});
+      if (extent.objects.empty() || extent.objects.back() != o) extent.objects.push_back(o);
+    }
+  }
+}
+
+bool FusedRegion::possible(const cv::Size& region) const {
+  return !extents_.empty() && region.width >= least_.width && region.height >= least_.height &&
+         (region.width >= 1.2 * least_.width || region.height >= 1.2 * least_.height);
+}
+
+bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
+  crop_.create(box.size(), work_.type());
+  crop_.setTo(level_of(background_));
+  const cv::Rect inside = box & cv::Rect(0, 0, work_.cols, work_.rows);
+  if (inside.empty()) return false;
+  work_(inside).copyTo(crop_(inside - box.tl()));
+  picture.resize(picture_length(normalization_));
+  if (!(normalizer_.normalize(crop_, background_.level, picture) > 0.0F)) return false;
+  quantize(picture, {picture_.ptr<std::uint8_t>(), picture_.total() * picture_.elemSize()});
+  recognizer_.look(picture_);
+  return true;
+}
+
+std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline) {
+  std::vector<Trial> all;
+  std::vector<float> picture;
+  for (std::size_t e = 0; e < extents_.size(); ++e) {
+    const cv::Size& size = extents_[e].size;
+    if ((1.0 - most_beyond) * size.width > outline.width ||
+        (1.0 - most_beyond) * size.height > outline.height)
+      continue;
+    for (const bool right : {false, true}) {
+      for (const bool bottom : {false, true}) {
+        const cv::Rect box({right ? outline.br().x - size.width : outline.x,
+                            bottom ? outline.br().y - size.height : outline.y},
+                           size);
+        if (!look(box, picture)) continue;
+        const auto votes = recognizer_.vote(extents_[e].objects);
+        all.push_back({box, e, static_cast<double>(votes[0].score) / recognizer_.total_weight()});
+      }
+    }
+  }
+  const auto kept = std::min(all.size(), most_trials);
+  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(kept), all.end(),
+                    [](const Trial& a, const Trial& b) { return a.votes > b.votes; });
+  all.resize(kept);
+  return all;
+}
+
+FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
+  FusedObject object{box, {}, {}};
+  if (!look(box, object.picture)) return object;
+  object.found = recognizer_.identify(shortlist, true);
+  const PartsPose& pose = object.found.best.poses.front();
+  const std::vector<cv::Size>& extents = parts_.extents[object.found.best.object];
+  // The size of the learned view nearest in pose, about the middle that alignment found.
+  const auto axes = parts_.poses[object.found.best.object].coarse_manifold().axes();
+  std::size_t view = 0;
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    std::size_t nearest = 0;
+    for (std::size_t i = 1; i < axes[a].samples.size(); ++i)
+      if (std::abs(axes[a].dof.difference(pose.q[a], axes[a].samples[i])) <
+          std::abs(axes[a].dof.difference(pose.q[a], axes[a].samples[nearest])))
+        nearest = i;
+    view = view * axes[a].samples.size() + nearest;
+  }
+  const cv::Size size = extents[view];
+  const double side = std::max(box.width, box.height);
+  const double x = box.x + 0.5 * box.width + side * pose.misalignment.dx;
+  const double y = box.y + 0.5 * box.height + side * pose.misalignment.dy;
+  object.box = {cv::Point(static_cast<int>(std::lround(x - 0.5 * size.width)),
+                          static_cast<int>(std::lround(y - 0.5 * size.height))),
+                size};
+  return object;
+}
+
+std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline) {
+  std::vector<FusedObject> found;
+  for (const Trial& trial : trials(outline)) {
+    FusedObject object = settle(trial.box, extents_[trial.extent].objects);
+    if (!object.found.best.poses.empty()) found.push_back(std::move(object));
+  }
+  const auto by_evidence = [](const FusedObject& a, const FusedObject& b) {
+    return a.found.evidence > b.found.evidence;
+  };
+  std::ranges::sort(found, by_evidence);
+  found.resize(std::min(found.size(), most_first));
+  // Again in the box that alignment set right, where there is less to be aligned.
+  for (FusedObject& object : found) {
+    FusedObject again = settle(object.box, {});
+    if (!again.found.best.poses.empty() && again.found.evidence > object.found.evidence)
+      object = std::move(again);
+  }
+  std::erase_if(found, [&](const FusedObject& object) {
+    return !(object.found.evidence > parts_.covered_evidence - search_slack);
+  });
+  std::ranges::sort(found, by_evidence);
+  return found;
+}
+
+cv::Mat FusedRegion::silhouette(const FusedObject& object) const {
+  const PoseSpace& space = parts_.poses[object.found.best.object];
+  const int side = space.coarse().side;
+  Eigen::VectorXf pixels =
+      space.pixel_mean() +
+      space.coarse().basis *
+          space.coarse_manifold().evaluate(object.found.best.poses.front().q).cast<float>();
+  const auto level = static_cast<float>(silhouette_level / side);
+  const cv::Mat picture(side, side, CV_32F, pixels.data());
+  const int square = std::max(object.box.width, object.box.height);
+  cv::Mat scaled;
+  cv::resize(picture, scaled, {square, square}, 0.0, 0.0, cv::INTER_LINEAR);
+  const cv::Mat mask = scaled > level;
+  cv::Mat out = cv::Mat::zeros(work_.size(), CV_8U);
+  const cv::Rect place(object.box.x + object.box.width / 2 - square / 2,
+                       object.box.y + object.box.height / 2 - square / 2, square, square);
+  const cv::Rect inside = place & object.box & cv::Rect(0, 0, work_.cols, work_.rows);
+  if (!inside.empty()) mask(inside - place.tl()).copyTo(out(inside));
+  return out;
+}
+
+double FusedRegion::complete(FusedObject first, const cv::Mat& foreground,
+                             std::vector<FusedObject>& objects) {
+  const double whole = cv::countNonZero(foreground);
+  cv::Mat rest = foreground.clone();
+  objects.clear();
+  objects.push_back(std::move(first));
+  while (true) {
+    const cv::Mat taken = silhouette(objects.back());
+    rest.setTo(0, taken);
+    work_.setTo(level_of(background_), taken);
+    cv::Mat pieces;
+    cv::morphologyEx(rest, pieces, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+    int area = 0;
+    const cv::Rect outline = largest_piece(pieces, area);
+    if (area < least_remainder * whole || objects.size() == most_objects) return 1.0 - area / whole;
+    std::vector<FusedObject> next = candidates(outline);
+    if (next.empty()) return 1.0 - area / whole;
+    objects.push_back(std::move(next.front()));
+  }
+}
+
+const std::vector<FusedObject>& FusedRegion::take_apart(const cv::Mat& cut, const Background& background) {
+  background_ = background;
+  objects_.clear();
+  cut.copyTo(work_);
+  const cv::Mat foreground = foreground_of(cut, background);
+  int area = 0;
+  const cv::Rect outline = largest_piece(foreground, area);
+  if (area == 0) return objects_;
+  const std::vector<FusedObject> first = candidates(outline);
+  double most = 0.0;
+  std::vector<FusedObject> objects;
+  for (std::size_t i = 0; i < std::min(first.size(), most_first); ++i) {
+    cut.copyTo(work_);
+    const double explained = complete(first[i], foreground, objects);
+    if (objects.size() > 1 && explained > std::max(most, least_explained)) {
+      most = explained;
+      objects_ = objects;
+    }
+    if (most > plainly_explained) break;
+  }
+  // Each once more, without the others in its picture.
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    cut.copyTo(work_);
+    const cv::Mat own = silhouette(objects_[i]);
+    for (std::size_t k = 0; k < objects_.size(); ++k) {
+      if (k == i) continue;
+      cv::Mat other = silhouette(objects_[k]);
+      other.setTo(0, own);
+      work_.setTo(level_of(background_), other);
+    }
+    FusedObject again = settle(objects_[i].box, std::span(&objects_[i].found.best.object, 1));
+    if (again.found.best.poses.empty()) continue;
+    again.found.second = std::move(objects_[i].found.second);
+    again.found.second_share = objects_[i].found.second_share;
+    again.found.tie = objects_[i].found.tie;
+    objects_[i] = std::move(again);
+  }
+  const bool sure = std::ranges::all_of(objects_, [&](const FusedObject& object) {
+    const bool free = object.found.best.covered <= most_left_over;
+    return object.found.best.covered <= most_covered &&
+           object.found.evidence > parts_.covered_evidence - (free ? final_slack : 0.0);
+  });
+  if (!sure) objects_.clear();
+  return objects_;
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,107 @@
+// Objects that touch: told apart by their learned sizes.
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+#include "core/base/angle.h"
+#include "core/recognition/recognizer.h"
+#include "tests/support/learned_world.h"
+
+namespace eigenpose {
+namespace {
+
+using testing::SceneKnobs;
+
+/// Three objects with windows, learned from scenes by a camera that stands still.
+struct PartsWorld {
+  PartsWorld() {
+    testing::write_turn(folder.path(), "one", 1, 36, knobs());
+    testing::write_turn(folder.path(), "two", 2, 36, knobs());
+    testing::write_turn(folder.path(), "three", 3, 36, knobs());
+    sets = open_image_sets(folder.path());
+    LearningOptions options = testing::small_learning();
+    options.normalization.size = 64;
+    options.parts = true;
+    model = std::make_shared<const Model>(learn(all_views(sets), options));
+  }
+  static SceneKnobs knobs() {
+    SceneKnobs knobs;
+    knobs.width = 400;
+    knobs.height = 300;
+    knobs.x = 130.0;
+    knobs.y = 150.0;
+    knobs.scale = 1.6;
+    return knobs;
+  }
+  test::TemporaryFolder folder;
+  std::vector<ImageSet> sets;
+  std::shared_ptr<const Model> model;
+};
+
+const PartsWorld& world() {
+  static const PartsWorld made;
+  return made;
+}
+
+/// Two objects side by side, moved together until they are one region.
+cv::Mat touching(int left, double left_angle, int right, double right_angle, Recognizer& recognize) {
+  SceneKnobs a = PartsWorld::knobs();
+  SceneKnobs b = a;
+  for (b.x = a.x + 160.0;; b.x -= 2.0) {
+    cv::Mat scene = testing::scene_with(left, left_angle, a);
+    testing::draw_object(scene, right, right_angle, b);
+    Segmenter segmenter(recognize.model().normalization.segmentation);
+    if (segmenter.segment(scene).size() < 2) return scene;
+  }
+}
+
+TEST(FusedRegion, TellsTouchingObjectsApart) {
+  Recognizer recognize(world().model);
+  int right = 0;
+  int pairs = 0;
+  for (double angle = 5.0; angle < 360.0; angle += 50.0) {
+    ++pairs;
+    const auto outcomes = recognize.recognize(touching(1, angle, 2, angle + 65.0, recognize));
+    if (outcomes.size() != 2) continue;
+    const bool swapped = outcomes[0].box.x > outcomes[1].box.x;
+    const Outcome& left = outcomes[swapped ? 1 : 0];
+    const Outcome& other = outcomes[swapped ? 0 : 1];
+    ASSERT_EQ(left.verdict, Verdict::recognized);
+    ASSERT_EQ(other.verdict, Verdict::recognized);
+    EXPECT_EQ(left.best->object, "one");
+    EXPECT_EQ(other.best->object, "two");
+    EXPECT_LT(std::abs(circular_difference(left.best->q[0], angle, 360.0)), 12.0);
+    EXPECT_LT(std::abs(circular_difference(other.best->q[0], angle + 65.0, 360.0)), 12.0);
+    ++right;
+  }
+  EXPECT_GE(right, pairs - 2) << "of " << pairs;
+}
+
+TEST(FusedRegion, LeavesStrangersInOnePiece) {
+  Recognizer recognize(world().model);
+  int taken_apart = 0;
+  for (int kind = 20; kind < 32; ++kind) {
+    SceneKnobs knobs = PartsWorld::knobs();
+    knobs.scale = 2.4;  // large enough for two
+    const auto outcomes = recognize.recognize(testing::scene_with(kind, 30.0 * kind, knobs));
+    if (outcomes.size() == 1U)
+      EXPECT_EQ(outcomes[0].verdict, Verdict::unknown);
+    else
+      ++taken_apart;
+  }
+  EXPECT_LE(taken_apart, 1) << "of 12; made-up objects are much alike";
+}
+
+TEST(FusedRegion, AStrangerThatTouchesAKnownObjectMakesTheRegionUnknown) {
+  Recognizer recognize(world().model);
+  for (double angle = 5.0; angle < 360.0; angle += 90.0) {
+    const auto outcomes = recognize.recognize(touching(1, angle, 25, 40.0, recognize));
+    for (const Outcome& outcome : outcomes) {
+      if (outcome.verdict != Verdict::recognized) continue;
+      EXPECT_EQ(outcome.best->object, "one");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace eigenpose
