@@ -7,8 +7,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/parts/covered_calibration.h"
-
 namespace eigenpose {
 namespace {
 
@@ -26,7 +24,8 @@ constexpr double plainly_explained = 0.97;  ///< no other first object is tried
 /// What others leave in an object's picture costs evidence while they are being found, and some of it even
 /// with them taken out.
 constexpr double search_slack = 3.0;
-constexpr double most_left_over = 0.1;  ///< what is covered by more than this gets no slack in the end
+constexpr double most_overlapped = 0.25;  ///< of an object, in the end; strangers leave more unexplained
+constexpr double most_left_over = 0.1;    ///< what is covered by more than this gets no slack in the end
 constexpr double final_slack = 1.5;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
 
@@ -276,7 +275,7 @@ const std::vector<FusedObject>& FusedRegion::take_apart(const cv::Mat& cut, cons
   }
   const bool sure = std::ranges::all_of(objects_, [&](const FusedObject& object) {
     const bool free = object.found.best.covered <= most_left_over;
-    return object.found.best.covered <= most_covered &&
+    return object.found.best.covered <= most_overlapped &&
            object.found.evidence > parts_.covered_evidence - (free ? final_slack : 0.0);
   });
   if (!sure) objects_.clear();
