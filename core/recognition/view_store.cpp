@@ -142,6 +142,7 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
                       "has " + std::to_string(chosen.size()) + " view(s) of \"" + set.images->object() +
                           "\" to learn from; at least 3 around a turn are " + "needed: acquire more");
     std::vector<std::vector<double>> poses;
+    poses.reserve(chosen.size());
     for (const std::size_t i : chosen) poses.push_back(views.at(i).q);
     PoseGrid grid = find_pose_grid(set.images->workspace(), poses, set.images->object());
     objects_.push_back({set.images->object(), set.images->workspace(), std::move(grid.axes), jobs.size(),
