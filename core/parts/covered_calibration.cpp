@@ -18,18 +18,16 @@ namespace {
 /// same.
 constexpr double least_evidence = 4.0;
 
-/// Hides a square of the picture, a different one for each seed.
-void cover(cv::Mat& picture, std::size_t seed) {
-  constexpr double share = 0.2;
-  std::mt19937 random(static_cast<std::uint32_t>(seed));
-  const int side = static_cast<int>(std::lround(std::sqrt(share) * picture.cols));
-  const auto room = static_cast<std::uint32_t>(picture.cols - side + 1);
-  const auto x = static_cast<int>(random() % room);
-  const auto y = static_cast<int>(random() % room);
-  picture(cv::Rect(x, y, side, side)).setTo(cv::Scalar::all(0));
-}
+constexpr double hidden_share = 0.2;
 
 }  // namespace
+
+void hide_square(cv::Mat& picture, double share, double across, double down) {
+  const int side = static_cast<int>(std::lround(std::sqrt(share) * std::min(picture.cols, picture.rows)));
+  const cv::Rect square(static_cast<int>(across * (picture.cols - side)),
+                        static_cast<int>(down * (picture.rows - side)), side, side);
+  picture(square & cv::Rect(0, 0, picture.cols, picture.rows)).setTo(cv::Scalar::all(0));
+}
 
 std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std::vector<PartsViews>& objects,
                                              const CoveredCalibrationOptions& options,
@@ -60,7 +58,12 @@ std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std:
       result[i] = {view.object, view.object, -std::numeric_limits<double>::infinity()};
       for (const bool covered : {false, true}) {
         objects[view.object].view(view.view).copyTo(picture);
-        if (covered) cover(picture, i);
+        if (covered) {
+          std::mt19937 random(static_cast<std::uint32_t>(i));  // the same squares on every machine
+          const double across = static_cast<double>(random()) / 4294967296.0;
+          const double down = static_cast<double>(random()) / 4294967296.0;
+          hide_square(picture, hidden_share, across, down);
+        }
         recognizer.look(picture);
         const PartsIdentification found = recognizer.identify(others);
         if (found.best.covered > model.calibration[found.best.object].covered_share &&

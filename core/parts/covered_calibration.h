@@ -4,11 +4,13 @@
 /// speaks for it more than for strangers.
 ///
 /// Learned views are shown to the model as strangers, each to all objects but its own, as they are and with a
-/// fifth hidden; what speaks more for another object counts. A covered region is
-/// accepted when the evidence for it exceeds what all but a set share of these strangers reach.
+/// fifth hidden; what speaks more for another object counts. A covered region is accepted when the evidence
+/// for it exceeds what all but a set share of these strangers reach.
 
 #include <optional>
 #include <span>
+
+#include <opencv2/core.hpp>
 
 #include "core/parts/parts_learning.h"
 
@@ -34,9 +36,13 @@ std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std:
                                              const CoveredCalibrationOptions& options,
                                              const Progress& progress = {}, std::stop_token stop = {});
 
-/// The evidence that at most a share `stranger_rate` of them exceeds; +∞ where there are none.
+/// The evidence that at most a share `stranger_rate` of them exceeds, and no less than is ever enough; +∞
+/// where there are none.
 /// @param without this object's views, and what was taken for it, do not count.
 double covered_threshold(std::span<const CoveredEvidence> strangers, double stranger_rate,
                          std::optional<std::size_t> without = {});
+
+/// Covers a share of the picture with a black square. @param across,down where in the room that is left, 0…1.
+void hide_square(cv::Mat& picture, double share, double across, double down);
 
 }  // namespace eigenpose

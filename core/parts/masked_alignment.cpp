@@ -39,11 +39,6 @@ void MaskedAligner::look(const PosePicture& picture, const PoseSpace& space, std
   pixel_variance_ = variance_of_pixels * options_.noise / static_cast<double>(space.coarse().basis.rows());
 }
 
-void MaskedAligner::render(const std::vector<double>& q) {
-  rendered_.noalias() = space_->coarse().basis * space_->coarse_manifold().evaluate(q).cast<float>();
-  rendered_ += space_->pixel_mean();
-}
-
 double MaskedAligner::first_gain() const {
   const auto region = warped_.col(0).array();
   const float own = (weights_.array() * region.square()).sum();
@@ -125,7 +120,7 @@ MaskedPose MaskedAligner::follow(const std::vector<double>& start, double reach)
   pose.q_sigma.assign(start.size(), std::numeric_limits<double>::infinity());
   weights_ = Eigen::Map<const Eigen::VectorXf>(trust_.data(), scale.basis.rows());
   scale.warp(*picture_, {}, false, warped_);
-  render(start);
+  space_->render(start, rendered_);
   const double gain = first_gain();
   pose.misalignment.gain = gain;
   double step_share = reach / steps;
@@ -133,7 +128,7 @@ MaskedPose MaskedAligner::follow(const std::vector<double>& start, double reach)
   for (int round = 0; round < rounds; ++round) {
     scale.warp(*picture_, pose.misalignment, true, warped_);
     if (round >= trusting_rounds) {
-      render(pose.q);
+      space_->render(pose.q, rendered_);
       weigh_by_residual();
     }
     prepare(pose.misalignment, gain);
@@ -175,7 +170,7 @@ MaskedPose MaskedAligner::follow(const std::vector<double>& start, double reach)
   }
   pose.fine_cost = pose.cost;
   scale.warp(*picture_, pose.misalignment, false, warped_);
-  render(pose.q);
+  space_->render(pose.q, rendered_);
   const double half_precision = 0.5 / pixel_variance_;
   for (Eigen::Index i = 0; i < rendered_.size(); ++i) {
     const double difference = static_cast<double>(rendered_(i) - warped_(i, 0));

@@ -39,8 +39,6 @@ class MaskedAligner {
  private:
   using Vector5 = Eigen::Matrix<double, 5, 1>;
 
-  /// The object's picture at a pose, 32².
-  void render(const std::vector<double>& q);
   /// Gain that makes the trusted pixels agree with the picture rendered last, minus 1.
   [[nodiscard]] double first_gain() const;
   /// Weights from what the rendered picture leaves unexplained of the warped region.

@@ -256,6 +256,11 @@ void PoseSpace::make_samples() {
   }
 }
 
+void PoseSpace::render(std::span<const double> q, Eigen::VectorXf& out) const {
+  out.noalias() = coarse_.basis * coarse_manifold_->evaluate(q).cast<float>();
+  out += pixel_mean_;
+}
+
 std::size_t PoseSpace::memory() const {
   const auto floats = coarse_.basis.size() + fine_.basis.size() + samples_.size();
   return static_cast<std::size_t>(floats) * sizeof(float);

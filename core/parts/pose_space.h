@@ -6,6 +6,7 @@
 /// kept, so that a point of the manifold is exactly the interpolated view.
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -56,6 +57,8 @@ class PoseSpace {
   [[nodiscard]] const PoseScale& coarse() const { return coarse_; }
   /// Mean picture of the coarse scale, 32² pixels.
   [[nodiscard]] const Eigen::VectorXf& pixel_mean() const { return pixel_mean_; }
+  /// The object's picture of unit energy at a pose: `out` gets 32² pixels of the coarse scale, row by row.
+  void render(std::span<const double> q, Eigen::VectorXf& out) const;
   [[nodiscard]] const PoseScale& fine() const { return fine_; }
   [[nodiscard]] const Manifold& coarse_manifold() const { return *coarse_manifold_; }
   [[nodiscard]] const Manifold& fine_manifold() const { return *fine_manifold_; }

@@ -164,13 +164,7 @@ cv::Mat damaged(const cv::Mat& picture, const TestDamage& damage, std::size_t in
   } else {
     result = picture.clone();
   }
-  if (damage.occlusion > 0) {
-    const int side =
-        static_cast<int>(std::lround(std::sqrt(damage.occlusion) * std::min(picture.cols, picture.rows)));
-    const cv::Rect cover(static_cast<int>(across * (picture.cols - side)),
-                         static_cast<int>(down * (picture.rows - side)), side, side);
-    result(cover & cv::Rect(0, 0, picture.cols, picture.rows)).setTo(cv::Scalar::all(0));
-  }
+  if (damage.occlusion > 0) hide_square(result, damage.occlusion, across, down);
   return result;
 }
 

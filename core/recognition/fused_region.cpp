@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <span>
 
 #include <opencv2/imgproc.hpp>
 
@@ -47,6 +47,18 @@ cv::Mat foreground_of(const cv::Mat& cut, const Background& background) {
   // Dark spots of an object are part of it.
   cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, cv::Mat::ones(7, 7, CV_8U));
   return mask;
+}
+
+/// The learned view nearest to a pose, in the order of the grid.
+std::size_t nearest_view(const PoseSpace& space, std::span<const double> q) {
+  const auto axes = space.coarse_manifold().axes();
+  std::size_t view = 0;
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    const auto away = [&](double sample) { return std::abs(axes[a].dof.difference(q[a], sample)); };
+    const auto nearest = std::ranges::min_element(axes[a].samples, {}, away);
+    view = view * axes[a].samples.size() + static_cast<std::size_t>(nearest - axes[a].samples.begin());
+  }
+  return view;
 }
 
 /// The box of the largest piece, and how many pixels all pieces have.
@@ -150,17 +162,7 @@ FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t
   const PartsPose& pose = object.found.best.poses.front();
   const std::vector<cv::Size>& extents = parts_.extents[object.found.best.object];
   // The size of the learned view nearest in pose, about the middle that alignment found.
-  const auto axes = parts_.poses[object.found.best.object].coarse_manifold().axes();
-  std::size_t view = 0;
-  for (std::size_t a = 0; a < axes.size(); ++a) {
-    std::size_t nearest = 0;
-    for (std::size_t i = 1; i < axes[a].samples.size(); ++i)
-      if (std::abs(axes[a].dof.difference(pose.q[a], axes[a].samples[i])) <
-          std::abs(axes[a].dof.difference(pose.q[a], axes[a].samples[nearest])))
-        nearest = i;
-    view = view * axes[a].samples.size() + nearest;
-  }
-  const cv::Size size = extents[view];
+  const cv::Size size = extents[nearest_view(parts_.poses[object.found.best.object], pose.q)];
   const double side = std::max(box.width, box.height);
   const double x = box.x + 0.5 * box.width + side * pose.misalignment.dx;
   const double y = box.y + 0.5 * box.height + side * pose.misalignment.dy;
@@ -197,10 +199,8 @@ std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline) {
 cv::Mat FusedRegion::silhouette(const FusedObject& object) const {
   const PoseSpace& space = parts_.poses[object.found.best.object];
   const int side = space.coarse().side;
-  Eigen::VectorXf pixels =
-      space.pixel_mean() +
-      space.coarse().basis *
-          space.coarse_manifold().evaluate(object.found.best.poses.front().q).cast<float>();
+  Eigen::VectorXf pixels;
+  space.render(object.found.best.poses.front().q, pixels);
   const auto level = static_cast<float>(silhouette_level / side);
   const cv::Mat picture(side, side, CV_32F, pixels.data());
   const int square = std::max(object.box.width, object.box.height);
@@ -247,9 +247,9 @@ const std::vector<FusedObject>& FusedRegion::take_apart(const cv::Mat& cut, cons
   const std::vector<FusedObject> first = candidates(outline);
   double most = 0.0;
   std::vector<FusedObject> objects;
-  for (std::size_t i = 0; i < std::min(first.size(), most_first); ++i) {
+  for (const FusedObject& begun : first) {
     cut.copyTo(work_);
-    const double explained = complete(first[i], foreground, objects);
+    const double explained = complete(begun, foreground, objects);
     if (objects.size() > 1 && explained > std::max(most, least_explained)) {
       most = explained;
       objects_ = objects;

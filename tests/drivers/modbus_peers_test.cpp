@@ -18,6 +18,7 @@
 #include "sim/modbus/modbus_server.h"
 #include "sim/modbus/rtu_server.h"
 #include "tests/drivers/child_process.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -152,15 +153,11 @@ TEST_F(MbpollPeer, HomesAndMovesTheSimulatedDriveOverTcp) {
 }
 
 TEST_F(MbpollPeer, ReadsTheSimulatedDriveOverASerialLine) {
-  std::string folder = (std::filesystem::temp_directory_path() / "eigenpose-mbpoll-XXXXXX").string();
-  ASSERT_NE(mkdtemp(folder.data()), nullptr);
-  {
-    const sim::SimRtuServer server(lab_, {.port = folder + "/line"});
-    const std::string mbpoll = "mbpoll -m rtu -b 115200 -P even -a 1 -0 -1 -q -t 4:hex -r 127 -c 1 ";
-    EXPECT_THAT(run(mbpoll + folder + "/line").output, HasSubstr("0x4020"))
-        << "ready, in position, not homed";
-  }
-  std::filesystem::remove_all(folder);
+  const test::TemporaryFolder folder;
+  const std::string line = folder.path() / "line";
+  const sim::SimRtuServer server(lab_, {.port = line});
+  const std::string mbpoll = "mbpoll -m rtu -b 115200 -P even -a 1 -0 -1 -q -t 4:hex -r 127 -c 1 ";
+  EXPECT_THAT(run(mbpoll + line).output, HasSubstr("0x4020")) << "ready, in position, not homed";
 }
 
 }  // namespace

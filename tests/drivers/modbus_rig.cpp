@@ -1,6 +1,5 @@
 #include "tests/drivers/modbus_rig.h"
 
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,12 +15,6 @@ using sim::WireFault;
 using sim::WireFaultKind;
 
 constexpr std::uint64_t seed = 11;
-
-std::filesystem::path new_folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "eigenpose-rtu-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-  return name;
-}
 
 }  // namespace
 
@@ -52,9 +45,9 @@ ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::millisecon
     tcp_.emplace(lab_, sim::SimModbusServerOptions{.speed_factor = quick});
     bus.endpoint = ModbusTcpEndpoint{"127.0.0.1", tcp_->port()};
   } else {
-    folder_ = new_folder();
-    rtu_.emplace(lab_, sim::SimRtuServerOptions{.port = folder_ / "line", .speed_factor = quick});
-    bus.endpoint = ModbusRtuEndpoint{.device = (folder_ / "line").string()};
+    const std::filesystem::path device = folder_.path() / "line";
+    rtu_.emplace(lab_, sim::SimRtuServerOptions{.port = device, .speed_factor = quick});
+    bus.endpoint = ModbusRtuEndpoint{.device = device.string()};
   }
   bus.response_timeout = response_timeout;
   bus.retry_pause = 5ms;
@@ -78,7 +71,6 @@ ModbusRig::~ModbusRig() {
   faults().clear();
   axis_.reset();
   rtu_.reset();
-  if (!folder_.empty()) std::filesystem::remove_all(folder_);
 }
 
 void ModbusRig::random_faults() {

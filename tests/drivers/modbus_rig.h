@@ -14,6 +14,7 @@
 #include "sim/modbus/modbus_server.h"
 #include "sim/modbus/rtu_server.h"
 #include "tests/drivers/axis_conformance.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 
@@ -70,7 +71,7 @@ class ModbusRig final : public AxisRig {
   sim::SimLab lab_;
   ModbusLine line_;
   double fault_rate_;
-  std::filesystem::path folder_;
+  test::TemporaryFolder folder_;  ///< of the serial line
   std::optional<sim::SimModbusServer> tcp_;
   std::optional<sim::SimRtuServer> rtu_;
   std::shared_ptr<ModbusBus> bus_;

@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 
 #include "core/base/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -18,12 +19,6 @@ namespace fs = std::filesystem;
 
 class AtomicFileTest : public testing::Test {
  protected:
-  AtomicFileTest() {
-    std::string name = (fs::temp_directory_path() / "eigenpose-atomic-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~AtomicFileTest() override { fs::remove_all(folder_); }
-
   static std::string read(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
     std::stringstream text;
@@ -34,7 +29,8 @@ class AtomicFileTest : public testing::Test {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
 
-  fs::path folder_;
+  test::TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 TEST_F(AtomicFileTest, ReplacesTheWholeContent) {
