@@ -232,6 +232,7 @@ void PoseSpace::make_samples() {
     }
     const bool closed = axis.dof.periodic && views > 1;
     std::vector<double> places;
+    places.reserve(static_cast<std::size_t>(count));
     const double first = closed ? axis.dof.lower : axis.samples.front();
     const double range = closed ? axis.dof.period() : axis.samples.back() - axis.samples.front();
     for (int i = 0; i < count; ++i) {
