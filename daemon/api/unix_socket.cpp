@@ -31,18 +31,6 @@ sockaddr_un address_of(const std::filesystem::path& path) {
   return address;
 }
 
-/// Whether a program answers on the socket file.
-bool somebody_answers(const std::filesystem::path& path, const sockaddr_un& address) {
-  const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (probe < 0) fail(path, "cannot be tried");
-  const int result = ::connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
-  const int error = result == 0 ? 0 : errno;
-  ::close(probe);
-  // Only a refused connection says that nobody listens; anything else (a full queue, no permission) is a live
-  // socket.
-  return error != ECONNREFUSED && error != ENOENT;
-}
-
 gid_t group_id(const std::filesystem::path& path, const std::string& name) {
   group entry{};
   group* found = nullptr;
@@ -53,6 +41,18 @@ gid_t group_id(const std::filesystem::path& path, const std::string& name) {
 }
 
 }  // namespace
+
+bool UnixSocket::is_answered(const std::filesystem::path& path) {
+  const sockaddr_un address = address_of(path);
+  const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (probe < 0) fail(path, "cannot be tried");
+  const int result = ::connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
+  const int error = result == 0 ? 0 : errno;
+  ::close(probe);
+  // Only a refused connection or a missing file says that nobody listens; anything else (a full queue, no
+  // permission) is a live socket.
+  return error != ECONNREFUSED && error != ENOENT;
+}
 
 UnixSocket::UnixSocket(std::filesystem::path path, unsigned mode, const std::string& group)
     : path_(std::move(path)) {
@@ -73,7 +73,7 @@ void UnixSocket::claim(unsigned mode, const std::string& group) {
   struct stat status {};
   if (::lstat(path_.c_str(), &status) == 0) {
     if (!S_ISSOCK(status.st_mode)) throw FileError(path_, "is there and is not a socket: move it away");
-    if (somebody_answers(path_, address))
+    if (is_answered(path_))
       throw FileError(
           path_,
           "another eigenposed answers on this socket: stop it first, or give this one another runtime_dir");

@@ -8,11 +8,10 @@
 #include <fmt/format.h>
 #include <grp.h>
 #include <pwd.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "daemon/api/unix_socket.h"
 #include "drivers/modbus/endpoint.h"
 
 namespace eigenpose {
@@ -356,16 +355,7 @@ void check_devices(const Devices& devices, const Clock& clock, const std::stop_t
 }
 
 bool is_service_running(const Config& config) {
-  const std::string path = config.results_socket().string();
-  sockaddr_un address{};
-  if (path.size() >= sizeof address.sun_path) return false;
-  address.sun_family = AF_UNIX;
-  path.copy(address.sun_path, path.size());
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (descriptor < 0) return false;
-  const bool answered = connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-  close(descriptor);
-  return answered;
+  return UnixSocket::is_answered(config.results_socket());
 }
 
 }  // namespace eigenpose

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include <fmt/format.h>
+#include <netdb.h>
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/socket.h>
@@ -77,7 +78,7 @@ void set_timeout(modbus_t* context, Duration timeout) {
 }
 
 std::string connect_advice(int error, bool serial) {
-  const std::string text = modbus_strerror(error);
+  std::string text = modbus_strerror(error);
   if (serial) {
     if (error == ENOENT) return text + ": is the adapter plugged in?";
     if (error == EACCES) return text + ": may this user open it (group dialout)?";
@@ -119,11 +120,12 @@ ModbusBus::Connection::Connection(const ModbusBusOptions& options, Duration time
   }
   if (serial_) {
     silent_interval_ = silent_interval_of(std::get<ModbusRtuEndpoint>(options.endpoint));
-    // Two programs on one line would read each other's answers.
+    // Two masters on one line would also read each other's answers. The lock goes with the open port: a port
+    // that was unplugged is nobody's.
     if (flock(modbus_get_socket(context_), LOCK_EX | LOCK_NB) != 0) {
       modbus_close(context_);
       modbus_free(context_);
-      throw ModbusFailure{ModbusFault::no_connection, "the port is in use by another program"};
+      throw ModbusFailure{ModbusFault::held, std::string(held_by_another)};
     }
   }
 }
@@ -131,6 +133,20 @@ ModbusBus::Connection::Connection(const ModbusBusOptions& options, Duration time
 ModbusBus::Connection::~Connection() {
   modbus_close(context_);
   modbus_free(context_);
+}
+
+std::string ModbusBus::Connection::far_end() const {
+  const int descriptor = modbus_get_socket(context_);
+  sockaddr_storage address{};
+  socklen_t length = sizeof address;
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  if (getpeername(descriptor, generic, &length) != 0) fail_with_errno(errno);
+  std::array<char, NI_MAXHOST> host{};
+  std::array<char, NI_MAXSERV> port{};
+  if (getnameinfo(generic, length, host.data(), host.size(), port.data(), port.size(),
+                  NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+    throw ModbusFailure{ModbusFault::no_connection, "the other end has no address"};
+  return fmt::format("tcp {}:{}", host.data(), port.data());
 }
 
 void ModbusBus::Connection::drain(Duration silence, Duration limit) {

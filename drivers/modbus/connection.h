@@ -21,6 +21,7 @@ enum class ModbusFault {
   no_answer,
   damaged,  ///< an answer that is not one to our request
   refused,  ///< a proper exception answer
+  held,     ///< another program drives the device
   busy      ///< a proper exception answer that asks for patience
 };
 
@@ -43,6 +44,8 @@ class ModbusBus::Connection {
   void write(int unit, std::uint16_t address, std::span<const std::uint16_t> values, Duration timeout);
 
   [[nodiscard]] bool is_serial() const { return serial_; }
+  /// The address of a TCP connection's other end, however it was spelt: "tcp 192.168.1.20:502".
+  [[nodiscard]] std::string far_end() const;
   /// Throws away what comes in, until nothing has come for `silence` or `limit` is over.
   void drain(Duration silence, Duration limit);
 

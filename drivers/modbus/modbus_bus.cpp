@@ -42,6 +42,10 @@ void check(const ModbusBusOptions& options) {
     throw std::invalid_argument(fmt::format("Modbus RTU stop bits must be 1 or 2, got {}", rtu.stop_bits));
 }
 
+bool is_final(ModbusFault fault) {
+  return fault == ModbusFault::refused || fault == ModbusFault::held;
+}
+
 bool breaks_the_line(ModbusFault fault) {
   return fault != ModbusFault::refused && fault != ModbusFault::busy;
 }
@@ -84,6 +88,13 @@ void ModbusBus::leave() {
   free_.notify_all();
 }
 
+void ModbusBus::claim(int unit) {
+  if (connection_->is_serial() || claims_.contains(unit)) return;  // an open port is locked as a whole
+  auto claim = DeviceClaim::make(fmt::format("{} unit {}", gateway_, unit));
+  if (!claim) throw ModbusFailure{ModbusFault::held, std::string(held_by_another)};
+  claims_.emplace(unit, std::move(*claim));
+}
+
 void ModbusBus::transact(const ModbusCaller& caller, TimePoint deadline, const std::string& what,
                          const Work& work) {
   std::optional<ModbusFailure> last;
@@ -107,10 +118,16 @@ void ModbusBus::transact(const ModbusCaller& caller, TimePoint deadline, const s
           const std::lock_guard lock(mutex_);
           ++statistics_.connections;
         }
-        if (line_suspect_ && connection_->is_serial())
-          connection_->drain(options_.response_timeout, 4 * options_.response_timeout);
-        line_suspect_ = false;
+        if (!connection_->is_serial()) {
+          std::string gateway = connection_->far_end();
+          if (gateway != gateway_) claims_.clear();
+          gateway_ = std::move(gateway);
+        }
       }
+      claim(caller.unit);
+      if (line_suspect_ && connection_->is_serial())
+        connection_->drain(options_.response_timeout, 4 * options_.response_timeout);
+      line_suspect_ = false;
       work(*connection_, timeout);
       const std::lock_guard lock(mutex_);
       ++statistics_.transactions;
@@ -125,7 +142,7 @@ void ModbusBus::transact(const ModbusCaller& caller, TimePoint deadline, const s
         connection_.reset();
         line_suspect_ = true;
       }
-      if (failure.fault == ModbusFault::refused) {
+      if (is_final(failure.fault)) {
         ++attempt;
         break;
       }

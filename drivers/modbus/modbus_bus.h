@@ -8,10 +8,14 @@
 /// is off, because it may block for ever when it reconnects and takes a late answer for the next one's. On
 /// RS-485, where frames carry no number, the new connection first waits until the line has been silent as
 /// long as an answer may take.
+///
+/// The bus holds what it has spoken to against every other bus, in this program and others: a serial line as
+/// a whole, as long as it is open; behind a TCP gateway each unit, as long as the bus lives.
 
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -21,6 +25,7 @@
 #include <vector>
 
 #include "core/base/clock.h"
+#include "drivers/device_claim.h"
 
 namespace eigenpose {
 
@@ -71,8 +76,8 @@ class ModbusBus {
   ~ModbusBus();
 
   /// Holding registers `address` … `address + count − 1`; count 1 … 125.
-  /// @throws DeviceTimeout (no answer), DeviceLost (no connection), DeviceError (damaged answers, or the
-  /// device's own refusal in words). All say how often it was tried.
+  /// @throws DeviceTimeout (no answer), DeviceLost (no connection), DeviceError (damaged answers, the
+  /// device's own refusal in words, or another program drives it). All say how often it was tried.
   std::vector<std::uint16_t> read(const ModbusCaller& caller, std::uint16_t address, int count,
                                   TimePoint deadline);
 
@@ -92,6 +97,7 @@ class ModbusBus {
   using Work = std::function<void(Connection&, Duration)>;
 
   void transact(const ModbusCaller& caller, TimePoint deadline, const std::string& what, const Work& work);
+  void claim(int unit);
   void enter(bool urgent);
   void leave();
 
@@ -107,6 +113,8 @@ class ModbusBus {
 
   std::unique_ptr<Connection> connection_;  ///< belongs to whoever is between `enter` and `leave`
   bool line_suspect_ = false;               ///< likewise: a late answer may still come
+  std::string gateway_;                     ///< likewise: the far end of the last TCP connection
+  std::map<int, DeviceClaim> claims_;       ///< likewise: of the drives behind it, by unit
 };
 
 }  // namespace eigenpose

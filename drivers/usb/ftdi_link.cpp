@@ -14,6 +14,7 @@
 #include <sys/time.h>
 
 #include "core/base/error.h"
+#include "drivers/device_claim.h"
 
 namespace eigenpose {
 
@@ -213,7 +214,7 @@ class FtdiLink::Device {
     find();
     libusb_set_auto_detach_kernel_driver(handle_.get(), 1);
     const int claimed = libusb_claim_interface(handle_.get(), options_.interface);
-    if (claimed == LIBUSB_ERROR_BUSY) throw DeviceError(name_, "open", "in use by another program");
+    if (claimed == LIBUSB_ERROR_BUSY) throw DeviceError(name_, "open", std::string(held_by_another));
     check(claimed, "open");
     claimed_ = true;
     try {

@@ -3,6 +3,7 @@
 
 #include "drivers/modbus/modbus_axis.h"
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <thread>
@@ -50,7 +51,8 @@ std::string failure_of(const std::function<void()>& work) {
 
 class ModbusAxisTest : public testing::Test {
  protected:
-  ModbusRig rig_{ModbusLine::tcp, 0.0};
+  /// Patient with a busy machine: these tests count what was asked for and when.
+  ModbusRig rig_{ModbusLine::tcp, 0.0, 300ms};
 };
 
 TEST_F(ModbusAxisTest, ASpoiltAnswerIsAskedForAgain) {
@@ -160,44 +162,92 @@ TEST_F(ModbusAxisTest, SeveralAxesShareOneBus) {
   EXPECT_EQ(rig_.bus()->statistics().connections, 1U);
 }
 
+TEST_F(ModbusAxisTest, ADriveHasOneMasterAtATime) {
+  SteadyClock clock;
+  const ModbusBusOptions line{
+      ModbusTcpEndpoint{"localhost", rig_.port()}};  // the same drive, spelt another way
+  EXPECT_NO_THROW(rig_.axis().state(soon()));
+  ModbusAxisOptions options = rig_.options();
+  ModbusAxis rival(oriental_motor_az_profile(), options, std::make_shared<ModbusBus>(line, clock), clock);
+  EXPECT_THAT(failure_of([&] { rival.move_to(90.0, soon(), {}); }), HasSubstr("another program drives it"));
+  options.unit = 2;
+  ModbusAxis neighbour(oriental_motor_az_profile(), options, std::make_shared<ModbusBus>(line, clock), clock);
+  EXPECT_NO_THROW(neighbour.state(soon())) << "another drive behind the same gateway";
+  rig_.discard_axis();
+  rig_.hang_up();
+  EXPECT_NO_THROW(rival.state(soon()));
+}
+
+TEST(ModbusSerialLine, HasOneMasterAtATimeWhicheverDriveItAsks) {
+  ModbusRig rig(ModbusLine::rtu, 0.0);
+  SteadyClock clock;
+  EXPECT_NO_THROW(rig.axis().state(soon()));
+  ModbusAxisOptions options = rig.options();
+  options.unit = 2;
+  const auto bus = std::make_shared<ModbusBus>(
+      ModbusBusOptions{ModbusRtuEndpoint{.device = rig.line(), .parity = 'N'}}, clock);
+  ModbusAxis rival(oriental_motor_az_profile(), options, bus, clock);
+  EXPECT_THAT(failure_of([&] { rival.state(soon()); }), HasSubstr("another program drives it"));
+  EXPECT_NO_THROW(rig.axis().state(soon())) << "and took nothing of what the first one reads";
+}
+
 TEST_F(ModbusAxisTest, BacklashOfTheTableIsNotTheDrivesError) {
   rig_.axis().home(soon(), {});
   rig_.drive().set_faults({.backlash_deg = 0.02});
   EXPECT_NEAR(rig_.axis().move_to(30.0, soon(), {}), 30.0, 0.01);
 }
 
-TEST(ModbusAxisWatchdog, ADeadDriverMeansAStoppedTable) {
-  ModbusRig rig(ModbusLine::tcp, 0.0, 150ms);
-  rig.axis().home(soon(), {});
-  std::jthread mover([&] { EXPECT_THROW(rig.axis().move_to(170.0, soon(), {}), DeviceError); });
-  while (!rig.truly_moving()) std::this_thread::yield();
-  rig.unplug();  // nobody speaks to the drive any more, and nobody can tell it to stop
+class ModbusAxisWatchdog : public ModbusAxisTest {
+ protected:
+  void SetUp() override { rig_.axis().home(soon(), {}); }
+  /// The same table under a drive's watchdog.
+  ModbusAxis watched(std::chrono::milliseconds watchdog) {
+    ModbusAxisOptions options = rig_.options();
+    options.watchdog = watchdog;
+    return {oriental_motor_az_profile(), options, rig_.bus(), clock_};
+  }
+  /// What the drive itself holds; 0: off.
+  int armed_ms() {
+    std::array<std::uint16_t, 2> registers{};
+    EXPECT_EQ(rig_.drive().read(0x138A, registers), sim::ModbusException::none);
+    return registers[0] * 65536 + registers[1];
+  }
+  SteadyClock clock_;
+};
+
+TEST_F(ModbusAxisWatchdog, ADeadDriverMeansAStoppedTable) {
+  rig_.drive().set_speed_factor(0.1);  // on its own the table would turn for a minute
+  ModbusAxis axis = watched(150ms);
+  std::jthread mover([&] { EXPECT_THROW(axis.move_to(170.0, soon(), {}), DeviceError); });
+  while (!rig_.truly_moving()) std::this_thread::yield();
+  rig_.unplug();  // nobody speaks to the drive any more, and nobody can tell it to stop
   mover.join();
-  while (rig.truly_moving()) std::this_thread::yield();
-  EXPECT_GT(std::abs(rig.true_position() - 170.0), 1.0);
-  EXPECT_EQ(rig.drive().alarm(), 0x85);
-  rig.plug_in();
-  EXPECT_NO_THROW(rig.axis().move_to(20.0, soon(), {})) << "an alarm of silence is no reason to refuse";
+  while (rig_.truly_moving()) std::this_thread::yield();
+  EXPECT_GT(std::abs(rig_.true_position() - 170.0), 1.0);
+  EXPECT_EQ(rig_.drive().alarm(), 0x85);
+  rig_.plug_in();
+  rig_.slow_down(false);
+  EXPECT_NO_THROW(watched(10s).move_to(20.0, soon(), {})) << "an alarm of silence is no reason to refuse";
 }
 
-/// Longer than a busy machine keeps the driver from asking while the table moves.
-constexpr auto patient_watchdog = 600ms;
-constexpr auto longer_than_patient = 900ms;
-
-TEST(ModbusAxisWatchdog, ARestingDriveRaisesNoAlarm) {
-  ModbusRig rig(ModbusLine::tcp, 0.0, patient_watchdog);
-  rig.axis().home(soon(), {});
-  rig.axis().move_to(10.0, soon(), {});
-  std::this_thread::sleep_for(longer_than_patient);  // silence is what is tested
-  EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
+TEST_F(ModbusAxisWatchdog, IsArmedWhileTheTableTurnsAndOffAtRest) {
+  rig_.slow_down(true);
+  ModbusAxis axis = watched(10s);
+  std::jthread mover([&] { axis.move_to(60.0, soon(), {}); });
+  while (!rig_.truly_moving()) std::this_thread::yield();
+  EXPECT_EQ(armed_ms(), 10'000);
+  mover.join();
+  EXPECT_EQ(armed_ms(), 0);
 }
 
-TEST(ModbusAxisWatchdog, AStoppedMoveLeavesNoWatchdogArmed) {
-  ModbusRig rig(ModbusLine::tcp, 0.0, patient_watchdog);
-  rig.axis().home(soon(), {});
-  EXPECT_THROW(rig.axis().move_to(170.0, std::chrono::steady_clock::now() + 60ms, {}), DeviceTimeout);
-  std::this_thread::sleep_for(longer_than_patient);  // silence is what is tested
-  EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
+TEST_F(ModbusAxisWatchdog, IsOffAfterAMoveThatWasStopped) {
+  rig_.slow_down(true);
+  ModbusAxis axis = watched(10s);
+  std::jthread mover([&] { EXPECT_THROW(axis.move_to(170.0, soon(), {}), Interrupted); });
+  while (!rig_.truly_moving()) std::this_thread::yield();
+  axis.stop_motion();
+  mover.join();
+  EXPECT_EQ(armed_ms(), 0);
 }
 
 TEST(ModbusAxisOptionsCheck, ImpossibleOnesAreRefusedBeforeAnythingIsOpened) {

@@ -1,5 +1,6 @@
 #include "tests/drivers/modbus_rig.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,17 +38,15 @@ std::vector<WireFault> survivable_faults(ModbusLine line, std::chrono::milliseco
   return faults;
 }
 
-ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::milliseconds watchdog,
-                     std::chrono::milliseconds response_timeout)
+ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::milliseconds response_timeout)
     : lab_(clock_), line_(line), fault_rate_(fault_rate) {
   ModbusBusOptions bus;
   if (line == ModbusLine::tcp) {
     tcp_.emplace(lab_, sim::SimModbusServerOptions{.speed_factor = quick});
     bus.endpoint = ModbusTcpEndpoint{"127.0.0.1", tcp_->port()};
   } else {
-    const std::filesystem::path device = folder_.path() / "line";
-    rtu_.emplace(lab_, sim::SimRtuServerOptions{.port = device, .speed_factor = quick});
-    bus.endpoint = ModbusRtuEndpoint{.device = device.string()};
+    rtu_.emplace(lab_, sim::SimRtuServerOptions{.port = this->line(), .speed_factor = quick});
+    bus.endpoint = ModbusRtuEndpoint{.device = this->line()};
   }
   bus.response_timeout = response_timeout;
   bus.retry_pause = 5ms;
@@ -59,10 +58,10 @@ ModbusRig::ModbusRig(ModbusLine line, double fault_rate, std::chrono::millisecon
   options_.acceleration = profile.defaults.acceleration;
   options_.arrival_tolerance = profile.defaults.arrival_tolerance;
   options_.patience.poll_interval = 5ms;
-  options_.patience.start_time = 80ms;
-  options_.patience.settle_time = 80ms;
-  options_.patience.stall_time = 300ms;
-  options_.watchdog = watchdog;
+  options_.patience.start_time = std::max(80ms, 2 * response_timeout);
+  options_.patience.settle_time = options_.patience.start_time;
+  options_.patience.stall_time = 4 * options_.patience.start_time;
+  options_.watchdog = 0ms;
   axis_ = std::make_unique<ModbusAxis>(profile, options_, bus_, clock_);
   random_faults();
 }
@@ -124,6 +123,7 @@ void ModbusRig::jam(bool jammed) {
 }
 
 void ModbusRig::slip() {
+  faults().clear();  // a move whose answer is lost is sent again, and the second one makes good what was lost
   drive().set_faults({.slip_steps = 40.0});
 }
 

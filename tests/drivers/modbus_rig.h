@@ -24,7 +24,8 @@ inline std::ostream& operator<<(std::ostream& stream, ModbusLine line) {
   return stream << (line == ModbusLine::tcp ? "Tcp" : "Rtu");
 }
 
-constexpr std::chrono::milliseconds rig_response_timeout{40};
+/// Longer than a busy machine keeps the simulated drives waiting, some attempts on end.
+constexpr std::chrono::milliseconds rig_response_timeout{100};
 
 /// What may go wrong on the line while the suite runs: everything that the driver can live through.
 std::vector<sim::WireFault> survivable_faults(
@@ -37,7 +38,6 @@ class ModbusRig final : public AxisRig {
  public:
   /// @param fault_rate of all requests, meets one of `survivable_faults`.
   ModbusRig(ModbusLine line, double fault_rate,
-            std::chrono::milliseconds watchdog = std::chrono::milliseconds(0),
             std::chrono::milliseconds response_timeout = rig_response_timeout);
   ~ModbusRig() override;
 
@@ -57,6 +57,10 @@ class ModbusRig final : public AxisRig {
   sim::AzDrive& drive() { return tcp_ ? tcp_->drive(1) : rtu_->drive(1); }
   sim::FaultPlan& faults() { return tcp_ ? tcp_->faults() : rtu_->faults(); }
   std::shared_ptr<ModbusBus> bus() { return bus_; }
+  int port() { return tcp_->port(); }
+  std::string line() { return (folder_.path() / "line").string(); }
+  /// Lets go of the line; `discard_axis` first.
+  void hang_up() { bus_.reset(); }
   /// Lets the drive turn steadily, with nobody asking the driver. @param degrees_per_s above 0.
   void turn_steadily(double degrees_per_s);
   /// Where the table really is, whole turns counted.

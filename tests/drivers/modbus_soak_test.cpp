@@ -33,7 +33,7 @@ class ModbusSoak : public testing::TestWithParam<ModbusLine> {};
 /// wrong position.
 TEST_P(ModbusSoak, NoWrongPositionIsEverReportedAndEveryFailureHasACause) {
   const std::uint64_t transactions = transactions_for(GetParam());
-  ModbusRig rig(GetParam(), 0.0, 0ms, response_timeout);
+  ModbusRig rig(GetParam(), 0.0, response_timeout);
   SteadyClock clock;
   rig.axis().home(clock.now() + 10s, {});
   rig.turn_steadily(360.0);
