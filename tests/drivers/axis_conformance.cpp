@@ -46,7 +46,7 @@ class Background {
 }  // namespace
 
 bool AxisConformance::eventually(const std::function<bool()>& condition) {
-  const TimePoint patience = std::chrono::steady_clock::now() + 10s;
+  const TimePoint patience = soon();
   while (std::chrono::steady_clock::now() < patience) {
     if (condition()) return true;
     std::this_thread::sleep_for(1ms);

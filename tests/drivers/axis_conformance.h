@@ -63,7 +63,8 @@ class AxisConformance : public testing::TestWithParam<AxisRigCase> {
 
   Axis& axis() { return rig_->axis(); }
   AxisRig& rig() { return *rig_; }
-  static TimePoint soon() { return std::chrono::steady_clock::now() + std::chrono::seconds(20); }
+  /// Longer than anything takes here on a busy machine, emulated too.
+  static TimePoint soon() { return std::chrono::steady_clock::now() + std::chrono::seconds(60); }
   /// Homed and at rest. Repeats what a fault may spoil.
   void home();
   /// The signed way from b to a, the short way round.
