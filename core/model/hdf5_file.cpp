@@ -33,6 +33,35 @@ void read_attribute(hid_t group, const std::string& name, hid_t memory_type, voi
   check(H5Aread(attribute.get(), memory_type, value), what);
 }
 
+/// A dataset without the time of its making: what is equal is written as equal bytes.
+Hdf5Handle make_dataset(hid_t group, const std::string& name, hid_t file_type, hid_t space,
+                        const std::string& what) {
+  const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, what);
+  check(H5Pset_obj_track_times(creation.get(), false), what);
+  return {H5Dcreate2(group, name.c_str(), file_type, space, H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+          H5Dclose, what};
+}
+
+void write_list(hid_t group, const std::string& name, hid_t file_type, hid_t memory_type, hsize_t size,
+                const void* values) {
+  const std::string what = "cannot write \"" + name + "\"; is the disk full?";
+  const Hdf5Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose, what);
+  const Hdf5Handle data = make_dataset(group, name, file_type, space.get(), what);
+  check(H5Dwrite(data.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), what);
+}
+
+/// A dataset of one dimension, and its length.
+struct OpenList {
+  OpenList(hid_t group, const std::string& name, const std::string& what)
+      : data(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose, what) {
+    const Hdf5Handle space(H5Dget_space(data.get()), H5Sclose, what);
+    if (H5Sget_simple_extent_ndims(space.get()) != 1) throw Hdf5Failure(what);
+    H5Sget_simple_extent_dims(space.get(), &size, nullptr);
+  }
+  Hdf5Handle data;
+  hsize_t size = 0;
+};
+
 template <typename Matrix>
 void write_dataset(hid_t group, const std::string& name, hid_t file_type, hid_t memory_type,
                    const Matrix& matrix) {
@@ -40,9 +69,7 @@ void write_dataset(hid_t group, const std::string& name, hid_t file_type, hid_t 
   const std::array<hsize_t, 2> shape{static_cast<hsize_t>(matrix.cols()),
                                      static_cast<hsize_t>(matrix.rows())};
   const Hdf5Handle space(H5Screate_simple(2, shape.data(), nullptr), H5Sclose, what);
-  const Hdf5Handle dataset(
-      H5Dcreate2(group, name.c_str(), file_type, space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-      H5Dclose, what);
+  const Hdf5Handle dataset = make_dataset(group, name, file_type, space.get(), what);
   check(H5Dwrite(dataset.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, matrix.data()), what);
 }
 
@@ -155,28 +182,29 @@ void Hdf5Group::write(const std::string& dataset, const Eigen::MatrixXd& matrix)
 }
 
 void Hdf5Group::write(const std::string& dataset, const std::vector<std::int8_t>& bytes) const {
-  const hsize_t size = bytes.size();
-  const std::string what = "cannot write \"" + dataset + "\"; is the disk full?";
-  const Hdf5Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose, what);
-  const Hdf5Handle data(H5Dcreate2(handle_.get(), dataset.c_str(), H5T_STD_I8LE, space.get(), H5P_DEFAULT,
-                                   H5P_DEFAULT, H5P_DEFAULT),
-                        H5Dclose, what);
-  check(H5Dwrite(data.get(), H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), what);
+  write_list(handle_.get(), dataset, H5T_STD_I8LE, H5T_NATIVE_INT8, bytes.size(), bytes.data());
+}
+
+void Hdf5Group::write(const std::string& dataset, std::span<const std::uint8_t> bytes) const {
+  write_list(handle_.get(), dataset, H5T_STD_U8LE, H5T_NATIVE_UINT8, bytes.size(), bytes.data());
 }
 
 std::vector<std::int8_t> Hdf5Group::read_bytes(const std::string& dataset) const {
   const std::string what = "has no bytes \"" + dataset + "\"";
-  const Hdf5Handle data(H5Dopen2(handle_.get(), dataset.c_str(), H5P_DEFAULT), H5Dclose, what);
-  const Hdf5Handle space(H5Dget_space(data.get()), H5Sclose, what);
-  hsize_t size = 0;
-  if (H5Sget_simple_extent_ndims(space.get()) != 1) throw Hdf5Failure(what);
-  H5Sget_simple_extent_dims(space.get(), &size, nullptr);
-  std::vector<std::int8_t> bytes(size);
-  check(H5Dread(data.get(), H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), what);
+  const OpenList list(handle_.get(), dataset, what);
+  std::vector<std::int8_t> bytes(list.size);
+  check(H5Dread(list.data.get(), H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), what);
   return bytes;
 }
 
-bool Hdf5Group::has_group(const std::string& name) const {
+void Hdf5Group::read_bytes(const std::string& dataset, std::span<std::uint8_t> bytes) const {
+  const std::string what = "has no " + std::to_string(bytes.size()) + " bytes \"" + dataset + "\"";
+  const OpenList list(handle_.get(), dataset, what);
+  if (list.size != bytes.size()) throw Hdf5Failure(what);
+  check(H5Dread(list.data.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), what);
+}
+
+bool Hdf5Group::has(const std::string& name) const {
   return H5Lexists(handle_.get(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
@@ -195,11 +223,10 @@ Hdf5Handle create_hdf5(const std::filesystem::path& path, std::uint64_t user_blo
           "cannot be made; is the folder there and writable?"};
 }
 
-Hdf5Handle open_hdf5(std::span<unsigned char> bytes) {
+Hdf5Handle open_hdf5(const std::filesystem::path& path) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "cannot be opened");
-  check(H5Pset_fapl_core(access.get(), 1U << 16, 0), "cannot be opened");
-  check(H5Pset_file_image(access.get(), bytes.data(), bytes.size()), "cannot be opened");
-  return {H5Fopen("model in memory", H5F_ACC_RDONLY, access.get()), H5Fclose, "is not an HDF5 file"};
+  check(H5Pset_file_locking(access.get(), false, true), "cannot be opened");
+  return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose, "is not an HDF5 file"};
 }
 
 Hdf5Group root_of(const Hdf5Handle& file) {

@@ -73,8 +73,12 @@ class Hdf5Group {
   void write(const std::string& dataset, const Eigen::MatrixXf& matrix) const;
   void write(const std::string& dataset, const Eigen::MatrixXd& matrix) const;
   void write(const std::string& dataset, const std::vector<std::int8_t>& bytes) const;
+  void write(const std::string& dataset, std::span<const std::uint8_t> bytes) const;
   [[nodiscard]] std::vector<std::int8_t> read_bytes(const std::string& dataset) const;
-  [[nodiscard]] bool has_group(const std::string& name) const;
+  /// Exactly as many bytes as there are.
+  void read_bytes(const std::string& dataset, std::span<std::uint8_t> bytes) const;
+  /// A group or dataset of this name stands below.
+  [[nodiscard]] bool has(const std::string& name) const;
   [[nodiscard]] Eigen::MatrixXf read_floats(const std::string& dataset) const;
   [[nodiscard]] Eigen::MatrixXd read_doubles(const std::string& dataset) const;
 
@@ -85,8 +89,8 @@ class Hdf5Group {
 /// Makes a file whose first `user_block` bytes are left to the caller, and returns its root. The file is
 /// written when `file` is destroyed, after the root.
 Hdf5Handle create_hdf5(const std::filesystem::path& path, std::uint64_t user_block);
-/// Opens a whole file held in memory. `bytes` must outlive the handle.
-Hdf5Handle open_hdf5(std::span<unsigned char> bytes);
+/// Opens a file to read it. Takes no lock on it: our files are replaced, never changed.
+Hdf5Handle open_hdf5(const std::filesystem::path& path);
 Hdf5Group root_of(const Hdf5Handle& file);
 
 }  // namespace eigenpose

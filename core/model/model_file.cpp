@@ -1,99 +1,22 @@
 #include "core/model/model_file.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <string>
-#include <string_view>
 #include <vector>
-
-#include <zlib.h>
 
 #include "core/base/atomic_file.h"
 #include "core/base/error.h"
-#include "core/image/picture_file.h"
 #include "core/model/hdf5_file.h"
 #include "core/model/parts_file.h"
+#include "core/model/sealed_file.h"
+#include "core/model/shared_groups.h"
 
 namespace eigenpose {
 namespace {
 
-constexpr std::size_t header_size = 512;  ///< HDF5 wants a power of two, at least 512
-constexpr std::string_view magic = "eigenpose model\n";
-constexpr int version = 3;
-
-using Header = std::array<char, header_size>;
-
-std::uint32_t checksum(std::span<const unsigned char> bytes) {
-  uLong crc = crc32(0L, nullptr, 0);
-  // zlib counts in 32 bits.
-  constexpr std::size_t piece = 1U << 30;
-  for (std::size_t at = 0; at < bytes.size(); at += piece)
-    crc = crc32(crc, bytes.data() + at, static_cast<uInt>(std::min(piece, bytes.size() - at)));
-  return static_cast<std::uint32_t>(crc);
-}
-
-/// The one header that belongs to this content; reading compares with it byte by byte.
-Header make_header(std::span<const unsigned char> content) {
-  Header header{};
-  std::snprintf(header.data(), header.size(), "%sversion %d\ncontent_bytes %zu\ncontent_crc32 %08x\n",
-                magic.data(), version, content.size(), checksum(content));
-  return header;
-}
-
-/// The number after `key` in the header, or −1.
-long header_number(std::string_view header, std::string_view key) {
-  const auto at = header.find(key);
-  long value = -1;
-  if (at != std::string_view::npos)
-    std::from_chars(header.data() + at + key.size(), header.data() + header.size(), value);
-  return value;
-}
-
-void check_header(std::span<const unsigned char> bytes, const std::filesystem::path& file) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
-                              std::min(bytes.size(), header_size));
-  if (!text.starts_with(magic))
-    throw FileError(file, "is not an eigenpose model; 'eigenpose learn' makes them");
-  if (const long found = header_number(text, "\nversion "); found != version)
-    throw FileError(file, "is a model of version " + std::to_string(found) + ", this program reads version " +
-                              std::to_string(version) + "; learn it again from its image sets");
-  const long content = header_number(text, "\ncontent_bytes ");
-  if (bytes.size() < header_size || content > static_cast<long>(bytes.size() - header_size))
-    throw FileError(file, "is truncated; restore it from a copy or learn it again from its image sets");
-  const Header expected = make_header(bytes.subspan(header_size));
-  if (std::memcmp(expected.data(), bytes.data(), header_size) != 0)
-    throw FileError(
-        file, "is damaged (wrong checksum); restore it from a copy or learn it again from its image sets");
-}
-
-void write_normalization(const Hdf5Group& group, const NormalizationOptions& options) {
-  group.write("size", std::int64_t{options.size});
-  group.write("color", std::int64_t{options.color});
-  group.write("type", image_type_name(options));
-  group.write("cropped", std::int64_t{options.cropped});
-  group.write("least_contrast", std::int64_t{options.segmentation.least_contrast});
-  group.write("noise_sigmas", options.segmentation.noise_sigmas);
-  group.write("bridged_gap", std::int64_t{options.segmentation.bridged_gap});
-  group.write("dirt_share", options.segmentation.dirt_share);
-}
-
-NormalizationOptions read_normalization(const Hdf5Group& group) {
-  NormalizationOptions options;
-  options.size = static_cast<int>(group.read_integer("size"));
-  set_image_type(options, group.read_text("type"));
-  if (options.color != group.read_bool("color"))
-    throw Hdf5Failure("has an image type that does not fit its colour");
-  options.cropped = group.read_bool("cropped");
-  options.segmentation.least_contrast = static_cast<int>(group.read_integer("least_contrast"));
-  options.segmentation.noise_sigmas = group.read_double("noise_sigmas");
-  options.segmentation.bridged_gap = static_cast<int>(group.read_integer("bridged_gap"));
-  options.segmentation.dirt_share = group.read_double("dirt_share");
-  return options;
-}
+constexpr SealedFormat model_format{"eigenpose model\n", 3,
+                                    "is not an eigenpose model; 'eigenpose learn' makes them",
+                                    "learn it again from its image sets"};
 
 void write_eigenspace(const Hdf5Group& group, const Eigenspace& eigenspace) {
   group.write("mean", Eigen::MatrixXf(eigenspace.mean));
@@ -128,16 +51,8 @@ void write_object(const Hdf5Group& group, const ModelObject& object) {
   const Hdf5Group axes = group.make_group("axes");
   for (std::size_t d = 0; d < object.workspace.size(); ++d) {
     const Hdf5Group axis = axes.make_group(numbered(d));
-    const Dof& dof = object.workspace[d];
-    axis.write("name", dof.name);
-    axis.write("unit", dof.unit);
-    axis.write("lower", dof.lower);
-    axis.write("upper", dof.upper);
-    axis.write("periodic", std::int64_t{dof.periodic});
+    write_axis(axis, object.manifold.axes()[d]);
     axis.write("observable", std::int64_t{object.dof_observable.at(d)});
-    const auto& samples = object.manifold.axes()[d].samples;
-    axis.write("samples", Eigen::MatrixXd(Eigen::Map<const Eigen::MatrixXd>(
-                              samples.data(), 1, static_cast<Eigen::Index>(samples.size()))));
   }
 }
 
@@ -148,17 +63,13 @@ ModelObject read_object(const Hdf5Group& group) {
   const Hdf5Group axes = group.open_group("axes");
   for (const std::string& name : axes.group_names()) {
     const Hdf5Group axis = axes.open_group(name);
-    const Dof dof{axis.read_text("name"), axis.read_text("unit"), axis.read_double("lower"),
-                  axis.read_double("upper"), axis.read_bool("periodic")};
-    const Eigen::MatrixXd samples = axis.read_doubles("samples");
-    dofs.push_back(dof);
-    sample_axes.push_back({dof, {samples.data(), samples.data() + samples.size()}});
+    sample_axes.push_back(read_axis(axis));
+    dofs.push_back(sample_axes.back().dof);
     observable.push_back(axis.read_bool("observable"));
   }
   const int degree = static_cast<int>(group.read_integer("degree"));
   std::optional<ObjectSpace> space;
-  const auto groups = group.group_names();
-  if (std::find(groups.begin(), groups.end(), "space") != groups.end()) {
+  if (group.has("space")) {
     const Hdf5Group own = group.open_group("space");
     space = ObjectSpace{read_eigenspace(own),
                         Manifold::from_coefficients(sample_axes, own.read_doubles("coefficients"), degree),
@@ -178,7 +89,7 @@ ModelObject read_object(const Hdf5Group& group) {
 
 void write_content(const Model& model, const std::filesystem::path& part) {
   const Hdf5Lock lock;
-  const Hdf5Handle file = create_hdf5(part, header_size);
+  const Hdf5Handle file = create_hdf5(part, seal_size);
   const Hdf5Group root = root_of(file);
   write_normalization(root.make_group("normalization"), model.normalization);
   write_eigenspace(root.make_group("eigenspace"), model.eigenspace);
@@ -194,9 +105,9 @@ void write_content(const Model& model, const std::filesystem::path& part) {
   provenance.write("energy", model.provenance.energy);
 }
 
-Model read_content(std::span<unsigned char> bytes) {
+Model read_content(const std::filesystem::path& path) {
   const Hdf5Lock lock;
-  const Hdf5Handle file = open_hdf5(bytes);
+  const Hdf5Handle file = open_hdf5(path);
   const Hdf5Group root = root_of(file);
   Model model;
   model.normalization = read_normalization(root.open_group("normalization"));
@@ -204,7 +115,7 @@ Model read_content(std::span<unsigned char> bytes) {
   const Hdf5Group objects = root.open_group("objects");
   for (const std::string& name : objects.group_names())
     model.objects.push_back(read_object(objects.open_group(name)));
-  if (root.has_group("parts"))
+  if (root.has("parts"))
     model.parts = std::make_shared<const PartsModel>(read_parts(root.open_group("parts"), model.objects));
   const Hdf5Group provenance = root.open_group("provenance");
   model.provenance.program_version = provenance.read_text("program_version");
@@ -244,22 +155,16 @@ void save_model(const Model& model, const std::filesystem::path& file) {
   } catch (const Hdf5Failure& failure) {
     throw FileError(file, failure.what());
   }
-  const auto bytes = read_file(atomic.part());
-  const Header header = make_header(std::span(bytes).subspan(header_size));
-  std::fstream part(atomic.part(), std::ios::in | std::ios::out | std::ios::binary);
-  part.write(header.data(), header.size());
-  part.close();
-  if (!part) throw FileError(file, "cannot be written; is the disk full?");
+  seal_file(model_format, atomic.part());
   atomic.commit();
 }
 
 Model load_model(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file))
     throw FileError(file, "there is no such model; 'eigenpose learn' makes one");
-  auto bytes = read_file(file);
-  check_header(bytes, file);
+  check_seal(model_format, file);
   try {
-    Model model = read_content(bytes);
+    Model model = read_content(file);
     check_shapes(model);
     return model;
   } catch (const Hdf5Failure& failure) {

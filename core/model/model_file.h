@@ -2,9 +2,7 @@
 
 /// The model on disk: one HDF5 file that Python, MATLAB or h5dump can open.
 ///
-/// The file begins with a block of 512 bytes that HDF5 skips: format, version, length and checksum (CRC-32)
-/// of everything after it. A file in which any byte was changed, or that is cut off, is refused before HDF5
-/// sees it.
+/// It is sealed (sealed_file.h), and the same bytes whenever the same model is written.
 ///
 ///     /normalization   attributes size, color, type, cropped, …
 ///     /eigenspace      mean (N), basis (K×N), eigenvalues (K), attribute total_scatter

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <optional>
 #include <set>
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/recognition/kept_views.h"
 #include "core/recognition/object_spaces.h"
 
 namespace eigenpose {
@@ -41,9 +43,8 @@ class Stopwatch {
 void check_names(std::span<const TrainingSet> sets) {
   std::set<std::string> names;
   for (const TrainingSet& set : sets)
-    if (!names.insert(set.images->object()).second)
-      throw Error("two image sets are of the object \"" + set.images->object() +
-                  "\"; learn only one of them");
+    if (!names.insert(set.object()).second)
+      throw Error("two image sets are of the object \"" + set.object() + "\"; learn only one of them");
 }
 
 /// The pictures of a store, object by object, as partial matching learns them.
@@ -87,7 +88,7 @@ Eigen::MatrixXd project_all(const AppearanceSource& source, const Eigenspace& ei
 }
 
 Model learn(std::span<const TrainingSet> sets, LearningOptions options, LearningReport* report,
-            const Progress& progress, std::stop_token stop) {
+            const Progress& progress, const std::stop_token& stop) {
   LearningReport local;
   LearningReport& told = report != nullptr ? *report : local;
   told = {};
@@ -96,7 +97,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   check_names(sets);
   options.normalization.cropped =
       !sets.empty() &&
-      std::all_of(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.images->cropped(); });
+      std::all_of(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.cropped(); });
   options.solver.threads = options.threads;
   options.rejection.threads = options.threads;
   // Windows and alignment look at brightness.
@@ -104,12 +105,24 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
 
   const ViewStore views(sets, store_options(options), progress, stop);
   told.views = views.count();
-  if (options.memory_limit > 0) options.solver.memory_limit = options.memory_limit - views.resident();
+  KnownProducts known = known_products(sets, views);
+  if (!known.rows.empty()) options.solver.known = &known;
+  const std::size_t held =
+      views.resident() + sizeof(double) * static_cast<std::size_t>(known.products.size());
+  if (options.memory_limit > 0)
+    options.solver.memory_limit = options.memory_limit > held ? options.memory_limit - held : 1;
+  const std::string created = utc_now();
+  std::optional<KeptViewsWriter> kept;
+  if (!options.kept_views.empty()) {
+    kept.emplace(options.kept_views, views, options, created);
+    options.solver.keep_products = [&kept](const Eigen::MatrixXd& products) { kept->write(products); };
+  }
   told.normalize_time = watch.lap();
 
   Model model;
   model.normalization = options.normalization;
   model.eigenspace = solve_eigenspace(views, options.solver, &told.solver, progress, stop);
+  known = {};
   told.eigenspace_time = watch.lap();
 
   const Eigen::MatrixXd points = project_all(views, model.eigenspace, options.threads);
@@ -168,8 +181,9 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     parts->covered_evidence = covered_threshold(told.covered, options.match.stranger_rate);
     told.parts_time = watch.lap();
   }
-  model.provenance = {options.program_version, utc_now(), options.image_sets, told.solver.solver,
+  model.provenance = {options.program_version, created, options.image_sets, told.solver.solver,
                       told.solver.energy};
+  if (kept) kept->commit();
   told.total_time = std::chrono::steady_clock::now() - began;
   return model;
 }

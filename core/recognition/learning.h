@@ -37,6 +37,9 @@ struct LearningOptions {
   /// a thread.
   std::size_t memory_limit = 0;
   std::filesystem::path scratch_folder = {};  ///< where that disk is; empty: the folder for temporary files
+  /// A file to keep the views and their inner products in, so that objects can join and leave the model later
+  /// (kept_views.h); empty: nowhere. It is there when `learn` returns.
+  std::filesystem::path kept_views = {};
   /// Kept in the model's provenance.
   std::string image_sets;
   std::string program_version;
@@ -62,7 +65,7 @@ struct LearningReport {
 /// @throws FileError, Error (too few views, no grid of poses, two sets of one object, nothing to be seen),
 /// std::invalid_argument for options out of range, Interrupted.
 Model learn(std::span<const TrainingSet> sets, LearningOptions options, LearningReport* report = nullptr,
-            const Progress& progress = {}, std::stop_token stop = {});
+            const Progress& progress = {}, const std::stop_token& stop = {});
 
 /// All views of every set.
 std::vector<TrainingSet> all_views(std::span<const ImageSet> sets);

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstring>
 #include <mutex>
+#include <optional>
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/image/appearance_maker.h"
+#include "core/recognition/kept_views.h"
 #include "core/recognition/pose_grid.h"
 
 namespace eigenpose {
@@ -18,6 +20,8 @@ namespace {
 struct Job {
   const ImageSet* images = nullptr;
   std::size_t view = 0;
+  std::size_t object = 0;
+  std::size_t place = 0;
 };
 
 /// Segmenters and normalisers hold scratch memory; views are worked on by several threads.
@@ -95,6 +99,20 @@ void kept_numbers(std::span<const std::uint8_t> bytes, bool range, std::span<flo
   }
 }
 
+/// A kept object as it stands in a store of these options, from view `first` on.
+ObjectViews kept_object(const TrainingSet& set, const NormalizationOptions& options, std::size_t first) {
+  NormalizationOptions kept = set.kept->options().normalization;
+  kept.cropped = options.cropped;  // of all objects together; a picture does not depend on it
+  if (kept != options)
+    throw Error(set.kept->file().string() +
+                ": its views are kept with another size, image type or segmentation than is asked for; learn "
+                "from the image sets again");
+  ObjectViews object = set.kept->objects()[set.kept_object];
+  object.first = first;
+  if (options.cropped) object.extents.clear();
+  return object;
+}
+
 }  // namespace
 
 float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segmenter, Normalizer& normalizer,
@@ -120,14 +138,29 @@ float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segm
   return energy;
 }
 
+const std::string& TrainingSet::object() const {
+  return kept != nullptr ? kept->objects()[kept_object].object : images->object();
+}
+
+bool TrainingSet::cropped() const {
+  return kept != nullptr ? kept->objects()[kept_object].cropped : images->cropped();
+}
+
 ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& options,
                      const Progress& progress, std::stop_token stop)
     : options_(options.normalization), length_(appearance_length(options_)) {
   if (sets.empty()) throw Error("there is no image set to learn from; import or acquire one");
   const bool range = is_range(options_);
   picture_bytes_ = picture_length(options_) * (range ? 2 : 1);
+  std::size_t count = 0;
   std::vector<Job> jobs;
+  std::vector<std::optional<Kind>> kinds(sets.size());
   for (const TrainingSet& set : sets) {
+    if (set.kept != nullptr) {
+      objects_.push_back(kept_object(set, options_, count));
+      count += objects_.back().count;
+      continue;
+    }
     const auto& views = set.images->views();
     if (range && !set.images->cropped())
       throw FileError(
@@ -145,23 +178,27 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
     poses.reserve(chosen.size());
     for (const std::size_t i : chosen) poses.push_back(views.at(i).q);
     PoseGrid grid = find_pose_grid(set.images->workspace(), poses, set.images->object());
-    objects_.push_back({set.images->object(), set.images->workspace(), std::move(grid.axes), jobs.size(),
-                        chosen.size(), std::vector<cv::Size>(options_.cropped ? 0 : chosen.size())});
-    for (const std::size_t place : grid.order) jobs.push_back({set.images, chosen[place]});
+    const std::size_t object = objects_.size();
+    kinds[object].emplace(set.images->load(chosen[grid.order.front()]));
+    objects_.push_back({set.images->object(), set.images->workspace(), std::move(grid.axes), count,
+                        chosen.size(), std::vector<cv::Size>(options_.cropped ? 0 : chosen.size()),
+                        set.images->cropped()});
+    for (const std::size_t place : grid.order) jobs.push_back({set.images, chosen[place], object, count++});
   }
 
-  const std::size_t all = jobs.size() * picture_bytes_;
+  const std::size_t all = count * picture_bytes_;
   if (options.memory_limit > 0 && all > options.memory_limit)
     on_disk_ = std::make_unique<ScratchFile>(options.scratch_folder, all);
   else
     pictures_.resize(all);
-  energies_.resize(jobs.size());
-  std::vector<Kind> kinds;
-  for (const ObjectViews& object : objects_)
-    kinds.emplace_back(jobs[object.first].images->load(jobs[object.first].view));
-  std::vector<std::size_t> object_of(jobs.size());
-  for (std::size_t o = 0; o < objects_.size(); ++o)
-    std::fill_n(object_of.begin() + static_cast<std::ptrdiff_t>(objects_[o].first), objects_[o].count, o);
+  energies_.resize(count);
+  for (std::size_t o = 0; o < sets.size(); ++o) {
+    if (sets[o].kept == nullptr) continue;
+    const ObjectViews& object = objects_[o];
+    std::vector<std::uint8_t> bytes(object.count * picture_bytes_);
+    sets[o].kept->read(sets[o].kept_object, bytes, std::span(energies_).subspan(object.first, object.count));
+    write_pictures(object.first, bytes);
+  }
 
   ScratchPool pool(options_);
   std::mutex progress_mutex;
@@ -169,10 +206,11 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
   parallel_for(jobs.size(), options.threads, [&](std::size_t i) {
     if (stop.stop_requested()) throw Interrupted();
     const Job& job = jobs[i];
+    ObjectViews& object = objects_[job.object];
     const cv::Mat image = job.images->load(job.view);
     const auto file = job.images->folder() / job.images->views()[job.view].file;
     const Kind kind(image);
-    const Kind& first = kinds[object_of[i]];
+    const Kind& first = *kinds[job.object];
     if (kind != first)
       throw FileError(file, "is " + kind.text() + ", the first view of \"" + job.images->object() + "\" is " +
                                 first.text() + "; all views of an object must be alike: acquire it again");
@@ -181,14 +219,11 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
       cv::Size extent;
       normalize_learned_view(image, job.images->cropped(), scratch->segmenter, scratch->normalizer,
                              scratch->picture, &extent);
-      if (!options_.cropped) {
-        ObjectViews& object = objects_[object_of[i]];
-        object.extents[i - object.first] = extent;
-      }
+      if (!options_.cropped) object.extents[job.place - object.first] = extent;
       keep(scratch->picture, range, scratch->bytes);
       kept_numbers(scratch->bytes, range, scratch->picture);
-      energies_[i] = scratch->maker.make(scratch->picture, scratch->appearance);
-      if (!(energies_[i] > 0.0F))
+      energies_[job.place] = scratch->maker.make(scratch->picture, scratch->appearance);
+      if (!(energies_[job.place] > 0.0F))
         throw Error("shows nothing of image type \"" + image_type_name(options_) +
                     "\"; learn another type or remove the view");
     } catch (const FileError&) {
@@ -196,10 +231,7 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
     } catch (const std::exception& trouble) {
       throw FileError(file, trouble.what());
     }
-    if (on_disk_)
-      on_disk_->write(i * picture_bytes_, scratch->bytes);
-    else
-      std::memcpy(pictures_.data() + i * picture_bytes_, scratch->bytes.data(), picture_bytes_);
+    write_pictures(job.place, scratch->bytes);
     pool.give_back(std::move(scratch));
     const std::lock_guard lock(progress_mutex);
     if (progress) progress({"normalising", ++done, jobs.size()});
@@ -228,6 +260,13 @@ void ViewStore::read_pictures(std::size_t first, std::span<std::uint8_t> bytes) 
     std::memcpy(bytes.data(), pictures_.data() + first * picture_bytes_, bytes.size());
 }
 
+void ViewStore::write_pictures(std::size_t first, std::span<const std::uint8_t> bytes) {
+  if (on_disk_)
+    on_disk_->write(first * picture_bytes_, bytes);
+  else
+    std::memcpy(pictures_.data() + first * picture_bytes_, bytes.data(), bytes.size());
+}
+
 void ViewStore::read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const {
   AppearanceMaker maker(options_);
   const bool range = is_range(options_);
@@ -252,6 +291,12 @@ cv::Mat ViewStore::picture(std::size_t i) const {
   cv::Mat picture(options_.size, options_.size, type);
   read_pictures(i, {picture.ptr<std::uint8_t>(), picture_bytes_});
   return picture;
+}
+
+std::vector<std::uint8_t> ViewStore::pictures(std::size_t first, std::size_t n) const {
+  std::vector<std::uint8_t> bytes(n * picture_bytes_);
+  read_pictures(first, bytes);
+  return bytes;
 }
 
 void picture_numbers(const cv::Mat& picture, std::span<float> numbers) {

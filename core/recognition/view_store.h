@@ -21,10 +21,18 @@
 
 namespace eigenpose {
 
-/// Which views of an image set are learned.
+class KeptViews;  // kept_views.h
+
+/// What is learned of one object: views of an image set, or those that a former learning kept.
 struct TrainingSet {
   const ImageSet* images = nullptr;
-  std::vector<std::size_t> views;  ///< indices into images->views(); empty means all
+  std::vector<std::size_t> views;   ///< indices into images->views(); empty means all
+  const KeptViews* kept = nullptr;  ///< else, all views of its object number `kept_object`
+  std::size_t kept_object = 0;
+
+  [[nodiscard]] const std::string& object() const;
+  /// See ImageSet::cropped.
+  [[nodiscard]] bool cropped() const;
 };
 
 /// The views of one object inside a ViewStore.
@@ -37,6 +45,7 @@ struct ObjectViews {
   std::size_t count = 0;  ///< n₁·…·n_m
   /// Size of the region that each view was cut out of, pixels; empty where pictures came ready-cut.
   std::vector<cv::Size> extents;
+  bool cropped = false;  ///< its pictures came ready-cut: it has no extents, or zeros where others have some
 };
 
 /// How views are made and kept.
@@ -58,7 +67,8 @@ class ViewStore final : public AppearanceSource {
  public:
   /// Reads, cuts out and normalises every view of `sets`, on all cores.
   /// @throws FileError naming the view (missing, truncated, another size than the first, nothing to be seen
-  /// in it); Error when an object has too few views or its poses are no grid; Interrupted.
+  /// in it); Error when an object has too few views, its poses are no grid, or kept views are normalised in
+  /// another way; Interrupted.
   ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& options, const Progress& progress,
             std::stop_token stop);
   ~ViewStore() override;
@@ -78,9 +88,14 @@ class ViewStore final : public AppearanceSource {
 
   /// The normalised picture of view i: CV_8UC1, CV_8UC3 or, of range, CV_16UC1.
   [[nodiscard]] cv::Mat picture(std::size_t i) const;
+  /// The bytes of n pictures, view after view.
+  [[nodiscard]] std::vector<std::uint8_t> pictures(std::size_t first, std::size_t n) const;
+  /// The norm of view i's appearance before it was scaled.
+  [[nodiscard]] float energy(std::size_t i) const { return energies_[i]; }
 
  private:
   void read_pictures(std::size_t first, std::span<std::uint8_t> bytes) const;
+  void write_pictures(std::size_t first, std::span<const std::uint8_t> bytes);
 
   NormalizationOptions options_;
   std::size_t length_ = 0;         ///< numbers of an appearance

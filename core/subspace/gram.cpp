@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/subspace/view_reader.h"
 #include "core/subspace/work_meter.h"
 
 namespace eigenpose {
@@ -43,7 +44,7 @@ void byte_tile(const Kernels& kernels, const ViewBlock& a, const ViewBlock& b,
     const std::size_t n = std::min(kByteBlock, a.length - k);
     pack_words(kernels, a, k, n, left);
     pack_words(kernels, b, k, n, right);
-    kernels.byte_dots(left.data(), kByteBlock, round_up(a.count, 3), right.data(), kByteBlock,
+    kernels.word_dots(left.data(), kByteBlock, round_up(a.count, 3), right.data(), kByteBlock,
                       round_up(b.count, 4), round_up(n, 16), sums.data(), kTile);
   }
   for (std::size_t j = 0; j < b.count; ++j) {
@@ -92,9 +93,44 @@ struct TilePair {
   std::size_t row, column;  ///< in tiles
 };
 
-/// The products of two blocks in tiles; `meter` counts one unit a tile.
-void tiled_products(const ViewBlock& a, const ViewBlock& b, bool lower_only, const GramOptions& options,
+/// Neighbouring views, and where they stand in their source.
+struct Stretch {
+  ViewBlock views;
+  std::size_t first = 0;
+};
+
+/// Fills a tile with known products. @return false, where one of its views is not known.
+bool copy_known(const KnownProducts& known, std::size_t first_row, std::size_t first_column,
+                Eigen::Ref<Eigen::MatrixXd> tile) {
+  const auto is_known = [&](std::size_t first, Eigen::Index n) {
+    const auto begin = known.rows.begin() + static_cast<std::ptrdiff_t>(first);
+    return std::all_of(begin, begin + n, [](Eigen::Index row) { return row >= 0; });
+  };
+  if (!is_known(first_row, tile.rows()) || !is_known(first_column, tile.cols())) return false;
+  for (Eigen::Index j = 0; j < tile.cols(); ++j) {
+    const Eigen::Index column = known.rows[first_column + static_cast<std::size_t>(j)];
+    for (Eigen::Index i = 0; i < tile.rows(); ++i)
+      tile(i, j) = known.products(known.rows[first_row + static_cast<std::size_t>(i)], column);
+  }
+  return true;
+}
+
+/// @throws std::invalid_argument.
+void check_known(const KnownProducts& known, std::size_t count) {
+  const Eigen::Index rows = known.products.rows();
+  const bool inside = std::all_of(known.rows.begin(), known.rows.end(),
+                                  [&](Eigen::Index row) { return row >= -1 && row < rows; });
+  if (known.rows.size() != count || known.products.cols() != rows || !inside)
+    throw std::invalid_argument("known products of " + std::to_string(known.rows.size()) + " views in " +
+                                std::to_string(rows) + " rows do not fit a source of " +
+                                std::to_string(count) + " views");
+}
+
+/// The products of two stretches of views in tiles; `meter` counts one unit a tile.
+void tiled_products(const Stretch& rows, const Stretch& columns, bool lower_only, const GramOptions& options,
                     Eigen::Ref<Eigen::MatrixXd> out, WorkMeter& meter) {
+  const ViewBlock& a = rows.views;
+  const ViewBlock& b = columns.views;
   const Kernels& kernels = options.kernels != nullptr ? *options.kernels : best_kernels();
   std::vector<TilePair> tiles;
   for (std::size_t column = 0; column * kTile < b.count; ++column) {
@@ -108,6 +144,10 @@ void tiled_products(const ViewBlock& a, const ViewBlock& b, bool lower_only, con
     const ViewBlock right = b.part(j, std::min(kTile, b.count - j));
     auto target = out.block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j),
                             static_cast<Eigen::Index>(left.count), static_cast<Eigen::Index>(right.count));
+    if (options.known != nullptr && copy_known(*options.known, rows.first + i, columns.first + j, target)) {
+      meter.finished(1);
+      return;
+    }
     if (left.bytes != nullptr) {
       byte_tile(kernels, left, right, target);
     } else {
@@ -123,17 +163,10 @@ std::size_t tiles_in(std::size_t views) {
 
 }  // namespace
 
-void inner_products(const ViewBlock& a, const ViewBlock& b, bool lower_only, const GramOptions& options,
-                    Eigen::Ref<Eigen::MatrixXd> out, const Progress& progress, std::stop_token stop) {
-  const std::size_t rows = tiles_in(a.count);
-  WorkMeter meter(progress, std::move(stop), "inner products",
-                  lower_only ? rows * (rows + 1) / 2 : rows * tiles_in(b.count));
-  tiled_products(a, b, lower_only, options, out, meter);
-}
-
 Eigen::MatrixXd gram_matrix(const AppearanceSource& source, const GramOptions& options,
                             const Progress& progress, std::stop_token stop) {
   const std::size_t count = source.count();
+  if (options.known != nullptr) check_known(*options.known, count);
   ViewReader band_reader(source);
   ViewReader stream_reader(source);
   // One band of views stays in memory while all later ones stream past it in strips; then the next band.
@@ -160,12 +193,12 @@ Eigen::MatrixXd gram_matrix(const AppearanceSource& source, const GramOptions& o
     const std::size_t n = std::min(band, count - first);
     const auto column = static_cast<Eigen::Index>(first);
     const auto width = static_cast<Eigen::Index>(n);
-    const ViewBlock held = band_reader.read(first, n);
+    const Stretch held{band_reader.read(first, n), first};
     tiled_products(held, held, true, options, gram.block(column, column, width, width), meter);
     for (std::size_t next = first + n; next < count; next += strip) {
       const std::size_t rows = std::min(strip, count - next);
       tiled_products(
-          stream_reader.read(next, rows), held, false, options,
+          {stream_reader.read(next, rows), next}, held, false, options,
           gram.block(static_cast<Eigen::Index>(next), column, static_cast<Eigen::Index>(rows), width), meter);
     }
   }

@@ -4,35 +4,41 @@
 
 #include <cstddef>
 #include <stop_token>
+#include <vector>
 
 #include <Eigen/Core>
 
 #include "core/base/progress.h"
 #include "core/subspace/appearance_source.h"
 #include "core/subspace/kernels.h"
-#include "core/subspace/view_reader.h"
 
 namespace eigenpose {
+
+/// Inner products of some views of a source, known from before: so objects join and leave an eigenspace
+/// without the work of learning it anew. Joining m views to M costs (M·m + m²/2)·N multiplications, leaving
+/// none.
+///
+/// Nothing is lost by it: each product depends on its two views alone, so the eigenspace is bit for bit the
+/// one that is learned anew. (Keeping a truncated basis instead of the products would be smaller, but its
+/// error is the discarded singular value over the eigenvalue gap, which no useful truncation keeps small.)
+struct KnownProducts {
+  Eigen::MatrixXd products;        ///< as `gram_matrix` gave them
+  std::vector<Eigen::Index> rows;  ///< of every view of the source: its row in `products`, or −1
+};
 
 struct GramOptions {
   unsigned threads = 0;         ///< 0 means all cores; the result does not depend on it
   std::size_t tile_memory = 0;  ///< bytes for views read from a source that is not resident; 0 means no limit
-  const Kernels* kernels = nullptr;  ///< null means the fastest of this machine
+  const Kernels* kernels = nullptr;      ///< null means the fastest of this machine
+  const KnownProducts* known = nullptr;  ///< taken from here where they stand there
 };
 
-/// out(i, j) = ⟨aᵢ, bⱼ⟩ for all views of the two blocks: exact integers for bytes, sums in double for floats.
-/// Every entry depends on its two views alone: not on threads, tiles, order, or (in floats too) the kernels.
-/// @param out a.count × b.count. @param lower_only the blocks are the same one: leave entries above the
-/// diagonal alone.
-/// @pre both blocks are bytes or both are floats, of one length.
-void inner_products(const ViewBlock& a, const ViewBlock& b, bool lower_only, const GramOptions& options,
-                    Eigen::Ref<Eigen::MatrixXd> out, const Progress& progress = {},
-                    std::stop_token stop = {});
-
-/// All inner products of a source's views, unscaled where they are bytes: M × M, full and symmetric. Cost
+/// All inner products of a source's views, unscaled where they are bytes: M × M, full and symmetric; exact
+/// integers for bytes, sums in double for floats. Every entry depends on its two views alone: not on threads,
+/// tiles, order, or (in floats too) the kernels. Cost
 /// M²N/2 multiplications, 8M² bytes, and the views once if `tile_memory` holds them all; if it holds the
 /// share 1/s of them, about (s+1)/2 times. @throws std::invalid_argument when `tile_memory` holds fewer than
-/// two views, Interrupted.
+/// two views, or known products do not fit the source; Interrupted.
 Eigen::MatrixXd gram_matrix(const AppearanceSource& source, const GramOptions& options,
                             const Progress& progress = {}, std::stop_token stop = {});
 

@@ -72,20 +72,10 @@ Eigenspace solve_gram(const SolverTask& task, SolverReport& report) {
   const std::size_t tiles = options.memory_limit > 0 ? options.memory_limit - fixed : 0;
   const SteadyClock clock;
   const TimePoint start = clock.now();
-  const GramOptions gram_options{options.threads, tiles, nullptr};
+  const GramOptions gram_options{options.threads, tiles, nullptr, options.known};
   Eigen::MatrixXd gram = gram_matrix(source, gram_options, task.progress, task.stop);
-  const Duration gram_time = clock.now() - start;
-  Eigenspace space = solve_products(std::move(gram), tiles, task, report);
-  report.gram_time = gram_time;
-  return space;
-}
-
-Eigenspace solve_products(Eigen::MatrixXd gram, std::size_t tile_memory, const SolverTask& task,
-                          SolverReport& report) {
-  const AppearanceSource& source = task.source;
-  const SolverOptions& options = task.options;
-  const SteadyClock clock;
-  const TimePoint start = clock.now();
+  if (options.keep_products) options.keep_products(gram);
+  const TimePoint solving = clock.now();
   const Eigen::VectorXd norms = view_norms(gram, source.has_bytes());
   const double total = normalize_and_center(gram, norms, options.threads);
   const EigenPairs pairs = leading_gram_pairs(gram, task);
@@ -96,9 +86,10 @@ Eigenspace solve_products(Eigen::MatrixXd gram, std::size_t tile_memory, const S
   const TimePoint projecting = clock.now();
   Eigenspace space =
       eigenspace_from_gram(source, norms, pairs.values.head(kept), pairs.vectors.leftCols(kept), total,
-                           {options.threads, tile_memory}, task.progress, task.stop);
+                           {options.threads, tiles}, task.progress, task.stop);
   report.exact_integers = source.has_bytes();
-  report.solve_time = projecting - start;
+  report.gram_time = solving - start;
+  report.solve_time = projecting - solving;
   report.back_projection_time = clock.now() - projecting;
   return space;
 }

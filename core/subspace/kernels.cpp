@@ -7,7 +7,7 @@ void widen(const std::uint8_t* bytes, std::size_t n, std::int16_t* words) {
   for (std::size_t k = 0; k < n; ++k) words[k] = bytes[k];
 }
 
-void byte_dots(const std::int16_t* a, std::size_t lda, std::size_t m, const std::int16_t* b, std::size_t ldb,
+void word_dots(const std::int16_t* a, std::size_t lda, std::size_t m, const std::int16_t* b, std::size_t ldb,
                std::size_t n, std::size_t length, std::int64_t* out, std::size_t ldo) {
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t j = 0; j < n; ++j) {
@@ -56,7 +56,7 @@ void combine(const double* a, std::size_t lda, std::size_t rows, const double* x
 }  // namespace
 
 const Kernels& portable_kernels() {
-  static const Kernels kernels{"portable", widen, byte_dots, dots, combine};
+  static const Kernels kernels{"portable", widen, word_dots, dots, combine};
   return kernels;
 }
 

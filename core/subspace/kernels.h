@@ -8,7 +8,7 @@
 
 namespace eigenpose {
 
-/// One set of inner loops. All sets give the same bits in `byte_dots` (integers), and in `dots` where the
+/// One set of inner loops. All sets give the same bits in `word_dots` (integers), and in `dots` where the
 /// doubles hold float values (each product is then exact, and every set adds in the same order). Thread-safe:
 /// no state.
 struct Kernels {
@@ -18,8 +18,9 @@ struct Kernels {
   void (*widen)(const std::uint8_t* bytes, std::size_t n, std::int16_t* words);
 
   /// out[i·ldo + j] += Σ_k a[i·lda + k]·b[j·ldb + k] for i < m, j < n, k < length, exactly.
-  /// Words are 0…255. @pre m % 3 == 0, n % 4 == 0, length % 16 == 0, length ≤ 32768 (the sum fits 31 bits).
-  void (*byte_dots)(const std::int16_t* a, std::size_t lda, std::size_t m, const std::int16_t* b,
+  /// @pre m % 3 == 0, n % 4 == 0, length % 16 == 0, and Σ_k |a·b| fits 31 bits: words of 0…255 up to length
+  /// 32768, or rows of norm up to 46340.
+  void (*word_dots)(const std::int16_t* a, std::size_t lda, std::size_t m, const std::int16_t* b,
                     std::size_t ldb, std::size_t n, std::size_t length, std::int64_t* out, std::size_t ldo);
 
   /// out[i·ldo + j] += Σ_k a[i·lda + k]·b[j·ldb + k] in double: four running sums, k modulo 4, then

@@ -38,7 +38,7 @@ EIGENPOSE_AVX2 inline void add_totals(__m256i s0, __m256i s1, __m256i s2, __m256
 
 /// 3 × 4 dot products at once: twelve accumulators, three operands and one in flight fill the sixteen
 /// registers.
-EIGENPOSE_AVX2 inline void byte_dots_3x4(const std::int16_t* a, std::size_t lda, const std::int16_t* b,
+EIGENPOSE_AVX2 inline void word_dots_3x4(const std::int16_t* a, std::size_t lda, const std::int16_t* b,
                                          std::size_t ldb, std::size_t length, std::int64_t* out,
                                          std::size_t ldo) {
   __m256i s00 = _mm256_setzero_si256(), s01 = s00, s02 = s00, s03 = s00;
@@ -70,12 +70,12 @@ EIGENPOSE_AVX2 inline void byte_dots_3x4(const std::int16_t* a, std::size_t lda,
   add_totals(s20, s21, s22, s23, out + 2 * ldo);
 }
 
-EIGENPOSE_AVX2 void byte_dots(const std::int16_t* a, std::size_t lda, std::size_t m, const std::int16_t* b,
+EIGENPOSE_AVX2 void word_dots(const std::int16_t* a, std::size_t lda, std::size_t m, const std::int16_t* b,
                               std::size_t ldb, std::size_t n, std::size_t length, std::int64_t* out,
                               std::size_t ldo) {
   for (std::size_t j = 0; j < n; j += 4) {
     for (std::size_t i = 0; i < m; i += 3) {
-      byte_dots_3x4(a + i * lda, lda, b + j * ldb, ldb, length, out + i * ldo + j, ldo);
+      word_dots_3x4(a + i * lda, lda, b + j * ldb, ldb, length, out + i * ldo + j, ldo);
     }
   }
 }
@@ -209,7 +209,7 @@ EIGENPOSE_AVX2 void combine(const double* a, std::size_t lda, std::size_t rows, 
 
 namespace detail {
 const Kernels* avx2_kernels() {
-  static const Kernels kernels{"avx2", widen, byte_dots, dots, combine};
+  static const Kernels kernels{"avx2", widen, word_dots, dots, combine};
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kernels : nullptr;
 }
 }  // namespace detail

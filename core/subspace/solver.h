@@ -2,6 +2,7 @@
 
 /// Finding the eigenspace: several exact solvers behind one interface, chosen by size unless named.
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -15,11 +16,14 @@
 
 namespace eigenpose {
 
+struct KnownProducts;  // gram.h
+
 /// How far the spatial-temporal adaptive solver may simplify the views. Its error bound follows from what it
 /// did.
 struct StaOptions {
   std::size_t block = 8;  ///< side of the blocks of pixels, 2…16
-  /// Largest part of a unit-energy view that leaving out small coefficients may change, 0…1 (0 keeps all).
+  /// Largest part of a unit-energy view that leaving out small coefficients may change, 0…1 (0 keeps all, as
+  /// 16-bit numbers).
   double spatial = 0.05;
   /// The same for standing in an earlier view's block for a similar one.
   double temporal = 0.05;
@@ -59,6 +63,11 @@ struct SolverOptions {
   /// matrix, vectors, the result), bytes; 0 means no limit. Each thread needs about 0.6 MB more.
   std::size_t memory_limit = 0;
   StaOptions sta = {};  ///< for the solver "sta" alone
+  /// Inner products that need not be computed again; the gram solver alone asks. They outlive the call.
+  const KnownProducts* known = nullptr;
+  /// If set, is shown all inner products, before the gram solver goes on to change them. Other solvers have
+  /// none.
+  std::function<void(const Eigen::MatrixXd& products)> keep_products = {};
 };
 
 struct SolverReport {

@@ -35,12 +35,6 @@ Eigenspace solve_krylov(const SolverTask& task, SolverReport& report);
 Eigenspace solve_conjugate_gradient(const SolverTask& task, SolverReport& report);
 Eigenspace solve_sta(const SolverTask& task, SolverReport& report);
 
-/// The second half of the Gram solver: from the views' inner products to the eigenspace.
-/// @param gram as `gram_matrix` gives it. @param tile_memory bytes for views of a source that is not
-/// resident.
-Eigenspace solve_products(Eigen::MatrixXd gram, std::size_t tile_memory, const SolverTask& task,
-                          SolverReport& report);
-
 /// The K leading eigenpairs of a centred Gram matrix: block Krylov, or the full eigen-solve of small ones.
 EigenPairs leading_gram_pairs(const Eigen::MatrixXd& gram, const SolverTask& task);
 

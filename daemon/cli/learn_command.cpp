@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/model/model_file.h"
+#include "core/recognition/kept_views.h"
 #include "core/recognition/learning.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
@@ -27,13 +28,24 @@ Examples:
   eigenpose learn sets/lab --to lab.model --objects mug,duck
   eigenpose learn sets/lab --to lab.model --type grey:0.7+gradient:0.3
   eigenpose learn sets/large --to large.model --memory-limit 256
-  eigenpose learn                              the running service learns what it has acquired and watches with it
+  eigenpose learn sets/lab --to lab.model --keep-views
+  eigenpose learn sets/new --update lab.model          what is new joins lab.model
+  eigenpose learn --update lab.model --remove mug,duck
+  eigenpose learn                                      the running service learns what it has acquired and watches with it
 
-The model is written at once when all is learned; a former model of that name stays until then.)";
+The model is written at once when all is learned; a former model of that name stays until then.
+
+--keep-views writes FILE.views beside the model: the normalised views and their inner products. --update makes of it
+the very model that would be learned anew from all image sets, with the options that it was learned with. It reads
+the images of new objects alone; the folders of the others may be gone. To learn an object anew, remove it and let it
+join in one command.)";
 
 struct LearnOptions {
   std::string sets;
   std::string to;
+  bool keep_views = false;
+  std::string update;
+  std::vector<std::string> remove;
   LearningArguments learning;
   ServiceOptions service;
 };
@@ -73,20 +85,69 @@ void print(const Model& model, const LearningReport& report, const std::string& 
   std::printf("model: %s\n", file.c_str());
 }
 
-int run_learn(const LearnOptions& options, const CLI::App& command, const std::stop_token& stop) {
-  if (options.sets.empty()) {
+std::filesystem::path views_file(const std::string& model) {
+  return model + ".views";
+}
+
+/// What a model is learned from, and how.
+struct Lesson {
+  std::vector<ImageSet> images;
+  std::unique_ptr<KeptViews> kept;
+  std::vector<TrainingSet> sets;
+  LearningOptions options;
+};
+
+Lesson new_lesson(const LearnOptions& options) {
+  Lesson lesson;
+  lesson.images = open_chosen_sets(options.sets, options.learning);
+  lesson.sets = all_views(lesson.images);
+  lesson.options = learning_options(options.learning, lesson.images, options.sets);
+  if (options.keep_views) lesson.options.kept_views = views_file(options.to);
+  return lesson;
+}
+
+/// The kept views of options.update, what joins and what leaves.
+Lesson next_lesson(const LearnOptions& options) {
+  if (options.sets.empty() && options.remove.empty())
+    throw ConfigError("--update: name a folder of image sets that join, or objects that leave with --remove");
+  Lesson lesson;
+  const Model former = load_model(options.update);
+  lesson.kept = std::make_unique<KeptViews>(views_file(options.update));
+  if (!lesson.kept->belong_to(former))
+    throw FileError(lesson.kept->file(),
+                    "does not belong to " + options.update +
+                        ", which was learned anew since; learn it from its image sets, with --keep-views");
+  lesson.options = lesson.kept->options();
+  if (!options.sets.empty()) {
+    lesson.images = open_chosen_sets(options.sets, options.learning);
+    check_complete(lesson.images);
+    const std::string folder = absolute_folder(options.sets);
+    if (!folder.starts_with(lesson.options.image_sets)) lesson.options.image_sets += ", " + folder;
+  }
+  lesson.sets = updated_sets(*lesson.kept, options.remove, lesson.images);
+  if (lesson.sets.empty()) throw ConfigError("--remove: no object would be left");
+  lesson.options.program_version = EIGENPOSE_VERSION;
+  lesson.options.threads = options.learning.threads;
+  lesson.options.memory_limit = memory_limit(options.learning);
+  lesson.options.kept_views = views_file(options.to);
+  return lesson;
+}
+
+int run_learn(LearnOptions options, const CLI::App& command, const std::stop_token& stop) {
+  const bool update = !options.update.empty();
+  if (options.sets.empty() && !update) {
     const int components =
         command.count("--components") > 0 ? static_cast<int>(options.learning.components) : 0;
     return learn_at_service(options.service, components, stop);
   }
+  if (options.to.empty()) options.to = options.update;
   if (options.to.empty()) throw Error("the model needs a name: add --to FILE");
-  const auto sets = open_chosen_sets(options.sets, options.learning);
-  LearningOptions learning = learning_options(options.learning, sets, options.sets);
+  Lesson lesson = update ? next_lesson(options) : new_lesson(options);
   const auto folder = std::filesystem::path(options.to).parent_path();
-  learning.scratch_folder = folder.empty() ? "." : folder;  // where there is room for the model
+  lesson.options.scratch_folder = folder.empty() ? "." : folder;  // where there is room for the model
   ConsoleProgress progress;
   LearningReport report;
-  const Model model = learn(all_views(sets), learning, &report, progress.callback(), stop);
+  const Model model = learn(lesson.sets, lesson.options, &report, progress.callback(), stop);
   save_model(model, options.to);
   progress.clear();
   print(model, report, options.to);
@@ -102,7 +163,17 @@ void add_learn_command(CLI::App& app, CommandLine& line) {
   command->add_option("sets", options->sets,
                       "Folder of image sets; without it the running service learns what it has acquired");
   command->add_option("--to", options->to, "The model file to write");
+  auto* keep = command->add_flag("--keep-views", options->keep_views,
+                                 "Keep the views beside the model, so that objects can join and leave it");
+  auto* update =
+      command
+          ->add_option("--update", options->update, "A model whose views were kept: the image sets join it")
+          ->excludes(keep);
+  command->add_option("--remove", options->remove, "Objects that leave the updated model, e.g. obj1,obj2")
+      ->delimiter(',')
+      ->needs(update);
   add_learning_options(*command, options->learning);
+  for (const std::string& fixed : fixed_learning_options()) update->excludes(command->get_option(fixed));
   add_service_options(*command, options->service);
   command->callback([options, command, &line] {
     line.action = [options, command, &line] { return run_learn(*options, *command, line.stop); };

@@ -82,6 +82,11 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--objects", arguments.objects, "Only these objects, e.g. obj1,obj2")->delimiter(',');
 }
 
+std::vector<std::string> fixed_learning_options() {
+  return {"--components", "--energy", "--size",   "--color",       "--grey",
+          "--type",       "--solver", "--degree", "--whole-region"};
+}
+
 std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments) {
   std::vector<ImageSet> sets = open_image_sets(folder);
   if (arguments.objects.empty()) return sets;
@@ -98,23 +103,35 @@ std::vector<ImageSet> open_chosen_sets(const std::string& folder, const Learning
   return sets;
 }
 
-LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
-                                 const std::string& folder) {
-  LearningOptions options;
+std::string absolute_folder(const std::string& folder) {
+  return std::filesystem::absolute(folder).lexically_normal().string();
+}
+
+std::size_t memory_limit(const LearningArguments& arguments) {
+  return static_cast<std::size_t>(arguments.memory_limit_mib * 1024.0 * 1024.0);
+}
+
+void check_complete(std::span<const ImageSet> sets) {
   for (const ImageSet& set : sets)
     if (!set.complete())
       throw FileError(set.folder(),
                       "is not complete; acquire or import it to its end, or leave it out with --objects");
+}
+
+LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
+                                 const std::string& folder) {
+  LearningOptions options;
+  check_complete(sets);
   options.normalization.size = arguments.size;
   choose_type(arguments, sets, options.normalization);
   options.parts = !arguments.whole_region;
-  options.memory_limit = static_cast<std::size_t>(arguments.memory_limit_mib * 1024.0 * 1024.0);
+  options.memory_limit = memory_limit(arguments);
   options.solver.solver = arguments.solver;
   options.solver.components = arguments.components;
   options.solver.energy = arguments.energy;
   options.spline_degree = arguments.degree;
   options.threads = arguments.threads;
-  options.image_sets = std::filesystem::absolute(folder).lexically_normal().string();
+  options.image_sets = absolute_folder(folder);
   options.program_version = EIGENPOSE_VERSION;
   return options;
 }

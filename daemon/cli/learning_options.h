@@ -37,9 +37,21 @@ struct LearningArguments {
 /// --memory-limit and --objects.
 void add_learning_options(CLI::App& command, LearningArguments& arguments);
 
+/// Names of those among them that a model, once learned, is bound to.
+std::vector<std::string> fixed_learning_options();
+
 /// The image sets below `folder`, only those named by --objects if any.
 /// @throws FileError, ConfigError naming an object that is not there.
 std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments);
+
+/// As a model's provenance names it.
+std::string absolute_folder(const std::string& folder);
+
+/// --memory-limit in bytes.
+std::size_t memory_limit(const LearningArguments& arguments);
+
+/// @throws FileError naming a set that is not complete.
+void check_complete(std::span<const ImageSet> sets);
 
 /// Colour is taken when all views are in colour, unless --type, --color or --grey says otherwise.
 /// @throws ConfigError for an unknown image type, or one that the views are not fit for.

@@ -119,6 +119,50 @@ TEST_F(OfflineCommands, LearnAndRecognizeRange) {
   EXPECT_NEAR(seen[0]["outcomes"][0]["q"][0].get<double>(), 126.0, 4.0) << "a fifth of a step";
 }
 
+TEST_F(OfflineCommands, LetObjectsJoinAndLeaveAModelWithoutTheImagesOfTheOthers) {
+  write_objects();
+  ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region --keep-views").code, 0);
+  std::filesystem::remove_all(path("sets"));
+  testing::write_turn(path("new"), "cup", 3, 18);
+  const auto objects = [&](const std::string& model) {
+    std::string names;
+    const json all = json::parse(eigenpose("inspect " + model + " --json").output);
+    for (const json& object : all["objects"]) names += object["name"].get<std::string>() + " ";
+    return names;
+  };
+  const Ended joined = eigenpose("learn new --update a.model --to b.model");
+  ASSERT_EQ(joined.code, 0) << joined.output;
+  EXPECT_EQ(objects("b.model"), "cup duck mug ");
+  EXPECT_EQ(objects("a.model"), "duck mug ");
+  const Ended left = eigenpose("learn --update b.model --remove duck,cup");
+  ASSERT_EQ(left.code, 0) << left.output;
+  EXPECT_EQ(objects("b.model"), "mug ");
+  EXPECT_EQ(
+      json::parse(eigenpose("recognize mug.png --model b.model --json").output)[0]["outcomes"][0]["object"],
+      "mug");
+  const Ended again = eigenpose("learn new --update b.model --objects cup");
+  ASSERT_EQ(again.code, 0) << again.output;
+  EXPECT_EQ(objects("b.model"), "cup mug ");
+
+  const auto refused = [&](const std::string& arguments) {
+    const Ended run = eigenpose(arguments);
+    EXPECT_NE(run.code, 0) << arguments;
+    return run.output;
+  };
+  EXPECT_THAT(refused("learn --update b.model --remove duck"),
+              AllOf(HasSubstr("duck"), HasSubstr("cup, mug")));
+  EXPECT_THAT(refused("learn new --update b.model"), HasSubstr("\"cup\" is learned already"));
+  EXPECT_THAT(refused("learn --update b.model"), HasSubstr("--remove"));
+  EXPECT_THAT(refused("learn --update b.model --remove cup,mug"), HasSubstr("no object would be left"));
+  EXPECT_THAT(refused("learn new --update b.model --size 64"), HasSubstr("excludes --size"));
+  ASSERT_EQ(eigenpose("learn new --to b.model --size 32 --whole-region").code, 0);
+  EXPECT_THAT(refused("learn --update b.model --remove cup"),
+              HasSubstr("b.model.views: does not belong to b.model"));
+  std::filesystem::remove(path("b.model.views"));
+  EXPECT_THAT(refused("learn --update b.model --remove cup"),
+              AllOf(HasSubstr("no kept views"), HasSubstr("--keep-views")));
+}
+
 TEST_F(OfflineCommands, EverySearchSaysTheSame) {
   write_objects();
   ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region").code, 0);

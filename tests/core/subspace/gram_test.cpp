@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/subspace/memory_source.h"
+#include "core/subspace/solver.h"
 #include "tests/core/subspace/subspace_samples.h"
 
 namespace eigenpose {
@@ -55,6 +56,82 @@ TEST(Gram, IsTheSameBitForBitWithAnyThreadsTilesAndInstructions) {
     EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 60, nullptr})) << "read in tiles";
     EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 2, nullptr})) << "read two views at a time";
   }
+}
+
+/// Objects of a set as [first, last) of its views.
+using Parts = std::vector<std::pair<std::size_t, std::size_t>>;
+
+/// The views of `parts`, one part after the other.
+std::vector<std::uint8_t> chosen(const std::vector<std::uint8_t>& bytes, std::size_t length,
+                                 const Parts& parts) {
+  std::vector<std::uint8_t> result;
+  for (const auto& [first, last] : parts)
+    result.insert(result.end(), bytes.begin() + static_cast<std::ptrdiff_t>(first * length),
+                  bytes.begin() + static_cast<std::ptrdiff_t>(last * length));
+  return result;
+}
+
+/// Where views [0, known) of the whole set are known: their rows among `parts`.
+KnownProducts known_of(const Eigen::MatrixXd& whole, Eigen::Index known, const Parts& parts) {
+  KnownProducts result{whole.topLeftCorner(known, known), {}};
+  for (const auto& [first, last] : parts)
+    for (auto i = static_cast<Eigen::Index>(first); i < static_cast<Eigen::Index>(last); ++i)
+      result.rows.push_back(i < known ? i : -1);
+  return result;
+}
+
+TEST(KnownProducts, GiveTheEigenspaceThatIsLearnedAnewBitForBit) {
+  constexpr std::size_t length = 300;
+  const auto all = test::smooth_views(400, length, 1);
+  const Eigen::MatrixXd whole = gram_matrix(ByteSource(all, length), {});
+  const Parts joined_last = {{0, 150}, {150, 300}, {300, 400}};
+  const Parts joined_between = {{0, 150}, {300, 400}, {150, 300}};
+  const Parts left = {{0, 20}, {170, 300}};
+  const Parts replaced = {{300, 400}, {150, 300}};
+  for (const Parts& parts : {joined_last, joined_between, left, replaced}) {
+    const auto bytes = chosen(all, length, parts);
+    const ByteSource source(bytes, length);
+    const KnownProducts known = known_of(whole, 300, parts);
+    Eigen::MatrixXd shown;
+    const SolverOptions anew{.solver = "gram", .components = 12};
+    SolverOptions incremental = anew;
+    incremental.known = &known;
+    incremental.keep_products = [&](const Eigen::MatrixXd& products) { shown = products; };
+    const Eigenspace a = solve_eigenspace(source, incremental);
+    const Eigenspace b = solve_eigenspace(source, anew);
+    EXPECT_EQ(a.mean, b.mean);
+    EXPECT_EQ(a.basis, b.basis);
+    EXPECT_EQ(a.eigenvalues, b.eigenvalues);
+    EXPECT_EQ(a.total_scatter, b.total_scatter);
+    EXPECT_EQ(shown, gram_matrix(source, {}));
+  }
+}
+
+TEST(KnownProducts, HoldForFloatsAndInTiles) {
+  const Eigen::MatrixXf views = test::views_of_rank(200, 250, 30, 1);
+  const FloatSource source(views);
+  const Eigen::MatrixXd whole = gram_matrix(source, {});
+  const KnownProducts known = known_of(whole, 220, {{0, 250}});
+  EXPECT_EQ(gram_matrix(source, {2, 0, nullptr, &known}), whole);
+  EXPECT_EQ(gram_matrix(StreamedSource(source), {2, 200 * 4 * 120, nullptr, &known}), whole);
+}
+
+TEST(KnownProducts, AreTakenNotComputedAgain) {
+  const auto bytes = test::smooth_views(200, 64, 1);
+  const KnownProducts known{Eigen::MatrixXd::Constant(1, 1, 7.0), std::vector<Eigen::Index>(200, 0)};
+  EXPECT_EQ(gram_matrix(ByteSource(bytes, 64), {1, 0, nullptr, &known}),
+            Eigen::MatrixXd::Constant(200, 200, 7.0));
+}
+
+TEST(KnownProducts, OfOtherViewsAreRefused) {
+  const auto bytes = test::smooth_views(20, 64, 1);
+  const ByteSource source(bytes, 64);
+  const Eigen::MatrixXd products = Eigen::MatrixXd::Identity(5, 5);
+  for (const KnownProducts& known : {KnownProducts{products, std::vector<Eigen::Index>(19, 0)},
+                                     {products, std::vector<Eigen::Index>(20, 5)},
+                                     {products, std::vector<Eigen::Index>(20, -2)},
+                                     {products.leftCols(4), std::vector<Eigen::Index>(20, 0)}})
+    EXPECT_THROW(gram_matrix(source, {1, 0, nullptr, &known}), std::invalid_argument);
 }
 
 TEST(Gram, RefusesAMemoryLimitThatHoldsNoTwoViews) {

@@ -16,7 +16,7 @@ TEST(Kernels, MultiplyBytesExactlyAtTheLargestValues) {
   const std::vector<std::int16_t> b(4 * kLength, 255);
   for (const Kernels* kernels : {&portable_kernels(), &best_kernels()}) {
     std::vector<std::int64_t> out(12, 5);
-    kernels->byte_dots(a.data(), kLength, 3, b.data(), kLength, 4, kLength, out.data(), 4);
+    kernels->word_dots(a.data(), kLength, 3, b.data(), kLength, 4, kLength, out.data(), 4);
     for (const std::int64_t sum : out) EXPECT_EQ(sum, 5 + 255LL * 255 * 32768) << kernels->name;
   }
 }
@@ -34,8 +34,8 @@ TEST(Kernels, GiveTheSameIntegersOnEveryMachine) {
   const std::int16_t* a = words.data();
   const std::int16_t* b = words.data() + 5 * kLength;
   std::vector<std::int64_t> fast(6 * 9, 0), plain(6 * 9, 0);
-  best_kernels().byte_dots(a, kLength, 6, b, kLength, 8, kLength, fast.data(), 9);
-  portable_kernels().byte_dots(a, kLength, 6, b, kLength, 8, kLength, plain.data(), 9);
+  best_kernels().word_dots(a, kLength, 6, b, kLength, 8, kLength, fast.data(), 9);
+  portable_kernels().word_dots(a, kLength, 6, b, kLength, 8, kLength, plain.data(), 9);
   EXPECT_EQ(fast, plain);
   std::int64_t expected = 0;
   for (std::size_t k = 0; k < kLength; ++k) expected += bytes[2 * kLength + k] * bytes[(5 + 7) * kLength + k];

@@ -1,0 +1,75 @@
+#include "core/subspace/orthogonalization.h"
+
+#include <gtest/gtest.h>
+
+#include "core/subspace/memory_source.h"
+#include "core/subspace/solver.h"
+#include "tests/core/subspace/subspace_samples.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr std::size_t kObjectLength = 300;
+
+/// Three objects' views as bytes.
+struct Objects {
+  std::vector<std::uint8_t> mug = test::smooth_views(50, kObjectLength, 1);
+  std::vector<std::uint8_t> duck = test::smooth_views(36, kObjectLength, 2);
+  std::vector<std::uint8_t> car = test::smooth_views(72, kObjectLength, 3);
+};
+
+TEST(Orthogonalize, SpansWhatTheGivenSubspacesSpan) {
+  const Eigen::MatrixXf all = test::views_of_rank(80, 40, 12, 9);
+  const Eigenspace whole = solve_eigenspace(FloatSource(all), {.solver = "dense", .components = 9});
+  // Two overlapping parts of one basis: columns 0…5 and 4…8.
+  const std::vector<Eigen::MatrixXf> parts{whole.basis.leftCols(6), whole.basis.rightCols(5)};
+  const OrthogonalizedBasis result = orthogonalize(parts, 1e-3);
+  ASSERT_EQ(result.basis.cols(), 9);
+  EXPECT_LT(test::largest_angle_deg(result.basis, whole.basis), 1e-3);  // float bases
+  // Shared directions have σ = √2, single ones 1, and two of the eleven columns are no directions.
+  EXPECT_NEAR(result.singular_values[0], std::sqrt(2.0), 1e-5);
+  EXPECT_NEAR(result.singular_values[1], std::sqrt(2.0), 1e-5);
+  EXPECT_NEAR(result.singular_values[2], 1.0, 1e-5);
+  EXPECT_LT(result.singular_values[9], 1e-5);
+}
+
+TEST(Orthogonalize, DropsDirectionsBelowTau) {
+  Eigen::MatrixXf a = Eigen::MatrixXf::Zero(10, 1), b = a;
+  a(0, 0) = 1.0F;
+  b(0, 0) = std::cos(0.02F);
+  b(1, 0) = std::sin(0.02F);
+  const std::vector<Eigen::MatrixXf> pair{a, b};
+  // Two vectors at an angle of 0.02: singular values √(1 ± cos 0.02), the small one 0.0141.
+  EXPECT_EQ(orthogonalize(pair, 0.013).basis.cols(), 2);
+  EXPECT_EQ(orthogonalize(pair, 0.015).basis.cols(), 1);
+}
+
+TEST(Orthogonalize, HoldsEveryObjectsEigenspace) {
+  const Objects objects;
+  std::vector<Eigenspace> spaces;
+  std::vector<const std::vector<std::uint8_t>*> sets{&objects.mug, &objects.duck, &objects.car};
+  for (const auto* bytes : sets) {
+    spaces.push_back(solve_eigenspace(ByteSource(*bytes, kObjectLength), {.components = 4}));
+  }
+  const Eigenspace joint = orthogonalize(std::span<const Eigenspace>(spaces));
+  EXPECT_LE(joint.components(), 3 * 4 + 2);
+  for (const Eigenspace& space : spaces) {
+    // A point of the object's space goes through the joint space and comes back, up to float rounding and
+    // tau.
+    const Eigen::VectorXf view = space.mean + space.basis * Eigen::VectorXf::LinSpaced(4, 0.3F, 0.1F);
+    EXPECT_LT((joint.reconstruct(joint.project(view)) - view).norm(), 2e-3F);
+  }
+  for (Eigen::Index k = 1; k < joint.components(); ++k)
+    EXPECT_GE(joint.eigenvalues[k - 1], joint.eigenvalues[k]);
+}
+
+TEST(Orthogonalize, RefusesSubspacesOfDifferentLength) {
+  const std::vector<Eigen::MatrixXf> bases{Eigen::MatrixXf::Identity(5, 2), Eigen::MatrixXf::Identity(6, 2)};
+  EXPECT_THROW(orthogonalize(bases), std::invalid_argument);
+  EXPECT_THROW(orthogonalize(std::span<const Eigen::MatrixXf>{}), std::invalid_argument);
+  const std::vector<Eigen::MatrixXf> one{Eigen::MatrixXf::Identity(5, 2)};
+  EXPECT_THROW(orthogonalize(one, 0.0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace eigenpose
