@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -25,24 +26,24 @@ using Eigen::MatrixXd;
 /// A block, without the heap: at most 16 × 16.
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 16, 16>;
 
-using SmallBlock = std::array<double, 256>;  ///< row by row
+using FloatBlock = std::array<float, 256>;  ///< row by row
 
 /// down · pixels · acrossᵀ. @tparam Width of the block where it is known, so that loops unroll; otherwise 0.
 template <std::size_t Width>
-void cosines(const SmallBlock& pixels, const MatrixXd& down, const MatrixXd& across,
-             SmallBlock& frequencies) {
+void cosines(const FloatBlock& pixels, const Eigen::MatrixXf& down, const Eigen::MatrixXf& across,
+             FloatBlock& frequencies) {
   const std::size_t width = Width > 0 ? Width : static_cast<std::size_t>(across.rows());
   const Index height = down.rows();
-  std::array<double, Width == 0 ? 16 : Width> row;
+  std::array<float, Width == 0 ? 16 : Width> row;
   for (Index u = 0; u < height; ++u) {
-    for (std::size_t x = 0; x < width; ++x) row[x] = 0.0;
+    for (std::size_t x = 0; x < width; ++x) row[x] = 0.0F;
     for (Index y = 0; y < height; ++y)
       for (std::size_t x = 0; x < width; ++x)
         row[x] += down(u, y) * pixels[static_cast<std::size_t>(y) * width + x];
-    double* out = frequencies.data() + static_cast<std::size_t>(u) * width;
-    for (std::size_t c = 0; c < width; ++c) out[c] = 0.0;
+    float* out = frequencies.data() + static_cast<std::size_t>(u) * width;
+    for (std::size_t c = 0; c < width; ++c) out[c] = 0.0F;
     for (std::size_t x = 0; x < width; ++x) {
-      const double* column = across.data() + x * width;
+      const float* column = across.data() + x * width;
       for (std::size_t c = 0; c < width; ++c) out[c] += row[x] * column[c];
     }
   }
@@ -61,54 +62,78 @@ MatrixXd cosine_matrix(std::size_t n) {
   return matrix;
 }
 
-/// Sets small coefficients to zero while their energy stays within `budget`: octave of energy by octave, the
-/// smallest first; of the last octave those of high frequency first. @return how many reach to the last one
-/// kept.
-std::size_t drop_small(std::vector<double>& coefficients, double budget) {
-  std::array<double, 256> octaves{};
-  std::array<std::uint8_t, 256> octave_of{};
-  for (std::size_t i = 0; i < coefficients.size(); ++i) {
-    const double energy = coefficients[i] * coefficients[i];
-    octave_of[i] = static_cast<std::uint8_t>(std::bit_cast<std::uint32_t>(static_cast<float>(energy)) >> 23U);
-    octaves[octave_of[i]] += energy;
-  }
-  std::size_t open = 0;  // the first octave that does not go as a whole
-  double dropped = 0.0;
-  while (open < octaves.size() && dropped + octaves[open] <= budget) dropped += octaves[open++];
+constexpr std::size_t kLanes = 8;  ///< sums side by side, so that the compiler can use vectors
+
+/// ‖a − b‖².
+float squared_distance(std::span<const float> a, const float* b) {
+  std::array<float, kLanes> sums{};
+  const std::size_t whole = a.size() - a.size() % kLanes;
+  for (std::size_t i = 0; i < whole; i += kLanes)
+    for (std::size_t l = 0; l < kLanes; ++l) sums[l] += (a[i + l] - b[i + l]) * (a[i + l] - b[i + l]);
+  float sum = std::accumulate(sums.begin(), sums.end(), 0.0F);
+  for (std::size_t i = whole; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return sum;
+}
+
+/// Sets small coefficients to zero while their energy stays within `budget`: first all below the largest of a
+/// few thresholds that holds, then, from high frequencies on, each that still fits. @return how many reach to
+/// the last one kept.
+std::size_t drop_small(std::span<float> coefficients, float budget) {
+  std::array<float, kLanes> thresholds{budget};
+  std::array<float, kLanes> sums{};
+  for (std::size_t l = 1; l < kLanes; ++l) thresholds[l] = 0.5F * thresholds[l - 1];
+  for (const float x : coefficients)
+    for (std::size_t l = 0; l < kLanes; ++l) sums[l] += x * x <= thresholds[l] ? x * x : 0.0F;
+  std::size_t chosen = 0;
+  while (chosen < kLanes && sums[chosen] > budget) ++chosen;
+  const float threshold = chosen < kLanes ? thresholds[chosen] : -1.0F;
+  float rest = chosen < kLanes ? budget - sums[chosen] : budget;
+  std::size_t width = 0;
   for (std::size_t i = coefficients.size(); i-- > 0;) {
-    if (octave_of[i] > open) continue;
-    const double energy = coefficients[i] * coefficients[i];
-    if (octave_of[i] == open) {
-      if (dropped + energy > budget) continue;
-      dropped += energy;
+    const float energy = coefficients[i] * coefficients[i];
+    if (energy > threshold) {
+      if (energy > rest) {
+        width = std::max(width, i + 1);
+        continue;
+      }
+      rest -= energy;
     }
-    coefficients[i] = 0.0;
+    coefficients[i] = 0.0F;
   }
-  std::size_t width = coefficients.size();
-  while (width > 0 && coefficients[width - 1] == 0.0) --width;
   return width;
 }
 
-/// Appends the block of view `j` to its position, as a new superblock or as part of the last one. @return
-/// what that changes in the view: ‖block − its stand-in‖².
-double append_block(CodedPosition& position, std::size_t j, const std::vector<double>& block,
-                    double spatial_budget, double temporal_budget, std::vector<double>& coded) {
-  coded = block;
+/// One position while views are coded.
+struct Coder {
+  CodedPosition& position;
+  std::span<float> last;  ///< coefficients of the last superblock
+};
+
+/// Appends a block of view `j` to its position, as a new superblock or as part of the last one. @return what
+/// that changes in the view: ‖block − its stand-in‖².
+float append_block(const Coder& coder, std::size_t j, std::span<const float> block, float spatial_budget,
+                   float temporal_budget, std::span<float> coded) {
+  auto& superblocks = coder.position.superblocks;
+  std::copy(block.begin(), block.end(), coded.begin());
   const std::size_t width = drop_small(coded, spatial_budget);
-  const auto distance = [&](const std::vector<double>& from) {
-    const Superblock& last = position.superblocks.back();
-    double sum = 0.0;
-    for (std::size_t c = 0; c < from.size(); ++c) {
-      const double difference = from[c] - (c < last.width ? position.coefficients[last.offset + c] : 0.0);
-      sum += difference * difference;
+  if (superblocks.empty() || squared_distance(coded, coder.last.data()) > temporal_budget) {
+    auto& coefficients = coder.position.coefficients;
+    superblocks.push_back({j, coefficients.size(), width});
+    std::fill(coder.last.begin(), coder.last.end(), 0.0F);
+    for (std::size_t c = 0; c < width; ++c) {
+      const auto steps = static_cast<std::int16_t>(std::lrint(coded[c] / static_cast<float>(sta_step)));
+      coefficients.push_back(steps);
+      coder.last[c] = static_cast<float>(sta_step) * static_cast<float>(steps);
     }
-    return sum;
-  };
-  if (position.superblocks.empty() || distance(coded) > temporal_budget) {
-    position.superblocks.push_back({j, position.coefficients.size(), width});
-    for (std::size_t c = 0; c < width; ++c) position.coefficients.push_back(static_cast<float>(coded[c]));
   }
-  return distance(block);
+  return squared_distance(block, coder.last.data());
+}
+
+/// The change of a view from the sum over its blocks, and the rounding of floats on the way: of transforms
+/// and scales below 2⁻¹⁹ of a unit-energy view, of sums below 2⁻¹⁷ of themselves.
+double rounded_up(double squared_change) {
+  const double change = std::sqrt(squared_change) * (1.0 + std::ldexp(1.0, -17)) + std::ldexp(1.0, -19);
+  return change * change;
 }
 
 }  // namespace
@@ -121,6 +146,8 @@ BlockTransform::BlockTransform(const AppearanceShape& shape, std::size_t side)
       blocks_across_((shape.columns + width_ - 1) / width_),
       down_(cosine_matrix(height_)),
       across_(cosine_matrix(width_)),
+      fast_down_(down_.cast<float>()),
+      fast_across_(across_.cast<float>()),
       zigzag_(height_ * width_) {
   std::iota(zigzag_.begin(), zigzag_.end(), std::size_t{0});
   std::stable_sort(zigzag_.begin(), zigzag_.end(), [&](std::size_t a, std::size_t b) {
@@ -134,21 +161,32 @@ BlockTransform::Corner BlockTransform::corner(std::size_t position) const {
   return {block / blocks_across_ * height_, block % blocks_across_ * width_, band};
 }
 
-void BlockTransform::forward(const double* view, std::size_t position, double* coefficients) const {
+bool BlockTransform::forward(const float* view, std::size_t position, float* coefficients) const {
   const Corner at = corner(position);
-  SmallBlock pixels{};
+  FloatBlock pixels;
   const std::size_t rows = std::min(height_, shape_.rows - at.row);
   const std::size_t columns = std::min(width_, shape_.columns - at.column);
+  if (rows < height_ || columns < width_) std::fill_n(pixels.begin(), size(), 0.0F);
   for (std::size_t y = 0; y < rows; ++y) {
-    const double* row = view + ((at.row + y) * shape_.columns + at.column) * shape_.bands + at.band;
-    for (std::size_t x = 0; x < columns; ++x) pixels[y * width_ + x] = row[x * shape_.bands];
+    const float* row = view + ((at.row + y) * shape_.columns + at.column) * shape_.bands + at.band;
+    if (shape_.bands == 1 && columns == 8)  // a copy of known length is a few instructions
+      std::copy_n(row, 8, pixels.begin() + static_cast<std::ptrdiff_t>(y * width_));
+    else
+      for (std::size_t x = 0; x < columns; ++x) pixels[y * width_ + x] = row[x * shape_.bands];
   }
-  SmallBlock frequencies;
+  std::uint32_t any = 0;
+  for (std::size_t i = 0; i < size(); ++i) any |= std::bit_cast<std::uint32_t>(pixels[i]);
+  if (any == 0) {
+    std::fill_n(coefficients, size(), 0.0F);
+    return false;
+  }
+  FloatBlock frequencies;
   if (width_ == 8)
-    cosines<8>(pixels, down_, across_, frequencies);
+    cosines<8>(pixels, fast_down_, fast_across_, frequencies);
   else
-    cosines<0>(pixels, down_, across_, frequencies);
+    cosines<0>(pixels, fast_down_, fast_across_, frequencies);
   for (std::size_t c = 0; c < zigzag_.size(); ++c) coefficients[c] = frequencies[zigzag_[c]];
+  return true;
 }
 
 void BlockTransform::add_inverse(const double* coefficients, std::size_t position, double* view) const {
@@ -172,7 +210,7 @@ std::size_t StaCode::bytes() const {
   std::size_t sum = 0;
   for (const CodedPosition& position : positions) {
     sum += position.superblocks.capacity() * sizeof(Superblock) +
-           position.coefficients.capacity() * sizeof(float);
+           position.coefficients.capacity() * sizeof(std::int16_t);
   }
   return sum;
 }
@@ -180,7 +218,7 @@ std::size_t StaCode::bytes() const {
 StaCode sta_code(const AppearanceSource& source, const BlockTransform& transform, const StaOptions& options,
                  unsigned threads, std::size_t tile_memory, std::size_t memory_limit,
                  const Progress& progress, std::stop_token stop) {
-  constexpr std::size_t kStrip = 64;  // views transformed at once: as doubles they take 8·N bytes each
+  constexpr std::size_t kStrip = 64;  // views transformed at once: as floats they take 4·N bytes each
   const std::size_t count = source.count();
   const std::size_t length = source.length();
   StaCode code;
@@ -188,40 +226,52 @@ StaCode sta_code(const AppearanceSource& source, const BlockTransform& transform
   code.changes = Eigen::VectorXd::Zero(static_cast<Index>(count));
   MatrixXd sum = MatrixXd::Zero(static_cast<Index>(length), 1);
   const double blocks = static_cast<double>(transform.positions());
-  const double spatial_budget = options.spatial * options.spatial / blocks;
-  const double temporal_budget = options.temporal * options.temporal / blocks;
+  const auto spatial_budget = static_cast<float>(options.spatial * options.spatial / blocks);
+  const auto temporal_budget = static_cast<float>(options.temporal * options.temporal / blocks);
+  const std::size_t size = transform.size();
+  std::vector<float> last(transform.positions() * size);
 
   ViewReader reader(source);
   const std::size_t strip = std::min(kStrip, reader.views_in(tile_memory));
   WorkMeter meter(progress, std::move(stop), "coding blocks", count);
-  MatrixXd views;
+  Eigen::MatrixXf views;
   for (std::size_t first = 0; first < count; first += strip) {
     const std::size_t n = std::min(strip, count - first);
     const ViewBlock block = reader.read(first, n);
     views.resize(static_cast<Index>(length), static_cast<Index>(n));
     MatrixXd weights(static_cast<Index>(n), 1);
-    for (std::size_t v = 0; v < n; ++v) {
+    parallel_for(n, threads, [&](std::size_t v) {
       auto view = views.col(static_cast<Index>(v));
-      block.widen(v, 0, length, view.data());
-      const double norm = block.bytes != nullptr ? view.norm() : 1.0;
+      if (block.bytes != nullptr)
+        std::copy_n(block.bytes + v * length, length, view.data());
+      else
+        std::copy_n(block.floats + v * length, length, view.data());
+      const double norm = block.bytes != nullptr ? std::sqrt(view.cast<double>().squaredNorm()) : 1.0;
       if (!(norm > 0.0)) {
         throw std::invalid_argument("view " + std::to_string(first + v) +
                                     " is black: it has no energy to scale; leave it out");
       }
-      view /= norm;
+      view *= static_cast<float>(1.0 / norm);
       weights(static_cast<Index>(v), 0) = 1.0 / norm;
-    }
+    });
     add_weighted_views(block, weights, 0, threads, sum);
-    MatrixXd changes(static_cast<Index>(n), static_cast<Index>(transform.positions()));
+    Eigen::MatrixXf changes(static_cast<Index>(n), static_cast<Index>(transform.positions()));
     parallel_for(transform.positions(), threads, [&](std::size_t p) {
-      std::vector<double> coefficients(transform.size()), coded(transform.size());
+      FloatBlock coefficients, coded;
+      const Coder coder{code.positions[p], std::span(last).subspan(p * size, size)};
       for (std::size_t v = 0; v < n; ++v) {
-        transform.forward(views.col(static_cast<Index>(v)).data(), p, coefficients.data());
+        const bool seen = transform.forward(views.col(static_cast<Index>(v)).data(), p, coefficients.data());
+        const bool black_before =
+            !coder.position.superblocks.empty() && coder.position.superblocks.back().width == 0;
         changes(static_cast<Index>(v), static_cast<Index>(p)) =
-            append_block(code.positions[p], first + v, coefficients, spatial_budget, temporal_budget, coded);
+            !seen && black_before
+                ? 0.0F
+                : append_block(coder, first + v, std::span(coefficients).first(size), spatial_budget,
+                               temporal_budget, std::span(coded).first(size));
       }
     });
-    code.changes.segment(static_cast<Index>(first), static_cast<Index>(n)) = changes.rowwise().sum();
+    code.changes.segment(static_cast<Index>(first), static_cast<Index>(n)) =
+        changes.cast<double>().rowwise().sum().unaryExpr(&rounded_up);
     if (memory_limit > 0 && code.bytes() > memory_limit) {
       throw std::invalid_argument("the coded views do not fit into the memory limit, which leaves " +
                                   std::to_string(memory_limit) +
@@ -250,7 +300,7 @@ MatrixXd sta_back_project(const StaCode& code, const BlockTransform& transform, 
                                         running.row(static_cast<Index>(block.first_view));
       for (std::size_t c = 0; c < block.width; ++c) {
         sums.row(static_cast<Index>(c)) +=
-            static_cast<double>(position.coefficients[block.offset + c]) * weight;
+            sta_step * static_cast<double>(position.coefficients[block.offset + c]) * weight;
       }
     }
     for (Index k = 0; k < weights.cols(); ++k)

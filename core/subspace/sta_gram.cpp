@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -13,107 +14,99 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr std::size_t kBand = 96;  ///< rows of the Gram matrix that one job computes
-constexpr std::size_t kTile = 48;  ///< superblocks multiplied at once
+constexpr std::size_t kBand = 192;  ///< views whose products with all earlier ones are one job
+/// Superblocks multiplied at once. Few, because the widest of them sets the cost.
+constexpr std::size_t kRows = 12;     ///< a multiple of 3
+constexpr std::size_t kColumns = 24;  ///< a multiple of 4
+constexpr std::size_t kWords = 16;    ///< the kernel takes so many at a time
 
-/// Superblocks [first, first + n) of a position as rows of `stride` doubles. @return the widest one.
-std::size_t pack(const CodedPosition& position, std::size_t first, std::size_t n, std::size_t stride,
-                 std::vector<double>& rows) {
-  std::size_t widest = 0;
-  for (std::size_t s = 0; s < n; ++s) {
-    const Superblock& block = position.superblocks[first + s];
-    double* row = rows.data() + s * stride;
-    std::copy_n(position.coefficients.data() + block.offset, block.width, row);
-    std::fill(row + block.width, row + stride, 0.0);
-    widest = std::max(widest, block.width);
-  }
-  return widest;
-}
-
-/// Rows [first, last) of the lower triangle, as second differences: a rectangle of equal values is four
-/// numbers, and of neighbouring rectangles most of these meet.
-class Band {
+/// Superblocks of one position, each less the one before it, as rows of words.
+class Differences {
  public:
-  Band(std::size_t first, std::size_t last)
-      : first_(first),
-        last_(last),
-        steps_(Steps::Zero(static_cast<Index>(last - first + 1), static_cast<Index>(last + 1))) {}
+  /// @param size coefficients of a block.
+  explicit Differences(std::size_t size) : stride_((size + kWords - 1) / kWords * kWords) {}
 
-  /// Adds a grid of rectangles: value(r, c) for views [row_ends[r], row_ends[r+1]) × [column_ends[c],
-  /// column_ends[c+1]).
-  void add(const std::vector<std::size_t>& row_ends, const std::vector<std::size_t>& column_ends,
-           const std::vector<double>& values) {
-    const std::size_t rows = row_ends.size() - 1;
-    const std::size_t columns = column_ends.size() - 1;
-    for (std::size_t r = 0; r <= rows; ++r) {
-      const double* here = r < rows ? values.data() + r * kTile : nullptr;
-      const double* above = r > 0 ? values.data() + (r - 1) * kTile : nullptr;
-      double* steps = &steps_(static_cast<Index>(std::clamp(row_ends[r], first_, last_) - first_), 0);
-      double before = 0.0;
-      for (std::size_t c = 0; c < columns; ++c) {
-        const double now = (here != nullptr ? here[c] : 0.0) - (above != nullptr ? above[c] : 0.0);
-        steps[std::min(column_ends[c], last_)] += now - before;
-        before = now;
-      }
-      steps[std::min(column_ends[columns], last_)] -= before;
+  void take(const CodedPosition& position, std::size_t count) {
+    words_.assign((count + kColumns) * stride_, 0);  // tiles of whole kernel steps reach over the end
+    widths_.resize(count);
+    views_.resize(count);
+    for (std::size_t s = 0; s < count; ++s) {
+      const Superblock& block = position.superblocks[s];
+      const std::int16_t* from = position.coefficients.data() + block.offset;
+      std::int16_t* row = words_.data() + s * stride_;
+      std::copy_n(from, block.width, row);
+      widths_[s] = block.width;
+      views_[s] = static_cast<Index>(block.first_view);
+      if (s == 0) continue;
+      const Superblock& before = position.superblocks[s - 1];
+      const std::int16_t* less = position.coefficients.data() + before.offset;
+      for (std::size_t c = 0; c < before.width; ++c) row[c] = static_cast<std::int16_t>(row[c] - less[c]);
+      widths_[s] = std::max(block.width, before.width);
     }
   }
-
-  void write(MatrixXd& gram) {
-    const auto rows = static_cast<Index>(last_ - first_);
-    for (Index i = 0; i < rows; ++i) {
-      if (i > 0) steps_.row(i) += steps_.row(i - 1);
-      const Index row = static_cast<Index>(first_) + i;
-      double value = 0.0;
-      for (Index j = 0; j <= row; ++j) {
-        value += steps_(i, j);
-        gram(row, j) = value;
-        gram(j, row) = value;
-      }
-    }
+  [[nodiscard]] std::size_t stride() const { return stride_; }
+  [[nodiscard]] const std::int16_t* row(std::size_t s) const { return words_.data() + s * stride_; }
+  /// The view where it begins.
+  [[nodiscard]] const Index* view(std::size_t s) const { return views_.data() + s; }
+  /// Of the widest of n, in whole steps of the kernel.
+  [[nodiscard]] std::size_t width(std::size_t first, std::size_t n) const {
+    const auto begin = widths_.begin() + static_cast<std::ptrdiff_t>(first);
+    const std::size_t widest = *std::max_element(begin, begin + static_cast<std::ptrdiff_t>(n));
+    return (widest + kWords - 1) / kWords * kWords;
   }
 
  private:
-  using Steps = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  std::size_t first_, last_;
-  Steps steps_;
+  std::size_t stride_;
+  std::vector<std::int16_t> words_;
+  std::vector<std::size_t> widths_;
+  std::vector<Index> views_;
 };
 
-/// Where superblocks [first, first + n) begin, and where the last one ends.
-std::vector<std::size_t> ends_of(const CodedPosition& position, std::size_t first, std::size_t n,
-                                 std::size_t views) {
-  std::vector<std::size_t> ends(n + 1);
-  for (std::size_t s = 0; s < n; ++s) ends[s] = position.superblocks[first + s].first_view;
-  ends[n] = position.end_of(first + n - 1, views);
-  return ends;
-}
-
-void add_position(const CodedPosition& position, std::size_t views, std::size_t first, std::size_t last,
-                  std::size_t stride, Band& band) {
+/// Adds the products of the differences that begin in views [first, last) with all that begin earlier or with
+/// them: to the columns of the former, above the diagonal.
+void add_position(const CodedPosition& position, std::size_t first, std::size_t last,
+                  Differences& differences, MatrixXd& steps) {
   const Kernels& kernels = best_kernels();
   const auto& blocks = position.superblocks;
-  const auto after = [&](std::size_t view) {
+  const auto begins_by = [&](std::size_t view) {
     return static_cast<std::size_t>(
-        std::upper_bound(blocks.begin(), blocks.end(), view,
-                         [](std::size_t v, const Superblock& b) { return v < b.first_view; }) -
+        std::lower_bound(blocks.begin(), blocks.end(), view,
+                         [](const Superblock& b, std::size_t v) { return b.first_view < v; }) -
         blocks.begin());
   };
-  const std::size_t begin = after(first) - 1;
-  const std::size_t end = after(last - 1);
-  std::vector<double> left(kTile * stride), right(kTile * stride), values(kTile * kTile);
-  for (std::size_t i = begin; i < end; i += kTile) {
-    const std::size_t rows = std::min(kTile, end - i);
-    const std::size_t left_width = pack(position, i, rows, stride, left);
-    if (left_width == 0) continue;
-    const std::vector<std::size_t> row_ends = ends_of(position, i, rows, views);
-    for (std::size_t j = 0; j < end; j += kTile) {
-      const std::size_t columns = std::min(kTile, end - j);
-      const std::size_t width = std::min(left_width, pack(position, j, columns, stride, right));
+  const std::size_t begin = begins_by(first);
+  const std::size_t end = begins_by(last);
+  if (begin == end) return;
+  differences.take(position, end);
+  const std::size_t stride = differences.stride();
+  std::vector<std::int64_t> values(kRows * kColumns);
+  for (std::size_t i = begin; i < end; i += kRows) {
+    const std::size_t rows = std::min(kRows, end - i);
+    const std::size_t row_width = differences.width(i, rows);
+    for (std::size_t j = 0; j < i + rows; j += kColumns) {
+      const std::size_t columns = std::min(kColumns, i + rows - j);
+      const std::size_t width = std::min(row_width, differences.width(j, columns));
       if (width == 0) continue;
-      std::fill(values.begin(), values.end(), 0.0);
-      kernels.dots(left.data(), stride, rows, right.data(), stride, columns, width, values.data(), kTile);
-      band.add(row_ends, ends_of(position, j, columns, views), values);
+      std::fill(values.begin(), values.end(), 0);
+      kernels.word_dots(differences.row(i), stride, (rows + 2) / 3 * 3, differences.row(j), stride,
+                        (columns + 3) / 4 * 4, width, values.data(), kColumns);
+      for (std::size_t r = 0; r < rows; ++r) {
+        double* column = &steps(0, *differences.view(i + r));
+        const Index* view = differences.view(j);
+        const std::int64_t* value = values.data() + r * kColumns;
+        const std::size_t earlier = std::min(columns, i + r + 1 - j);
+        for (std::size_t c = 0; c < earlier; ++c) column[view[c]] += static_cast<double>(value[c]);
+      }
     }
+  }
+}
+
+/// Running sums down and across of a symmetric matrix of whole numbers that stands above the diagonal.
+void sum_up(MatrixXd& steps) {
+  steps.triangularView<Eigen::StrictlyLower>() = steps.transpose();
+  for (Index j = 0; j < steps.cols(); ++j) {
+    for (Index i = 1; i < steps.rows(); ++i) steps(i, j) += steps(i - 1, j);
+    if (j > 0) steps.col(j) += steps.col(j - 1);
   }
 }
 
@@ -121,19 +114,20 @@ void add_position(const CodedPosition& position, std::size_t views, std::size_t 
 
 MatrixXd sta_gram(const StaCode& code, std::size_t views, std::size_t block_size, unsigned threads,
                   const Progress& progress, std::stop_token stop) {
-  MatrixXd gram(static_cast<Index>(views), static_cast<Index>(views));
+  // Whole numbers below 2⁵³ all the way: the order of the sums does not matter.
+  MatrixXd gram = MatrixXd::Zero(static_cast<Index>(views), static_cast<Index>(views));
   const std::size_t jobs = (views + kBand - 1) / kBand;
   WorkMeter meter(progress, std::move(stop), "inner products", jobs);
   parallel_for(jobs, threads, [&](std::size_t job) {
     // The last band is the longest: it goes first, so that no thread ends alone with it.
     const std::size_t first = (jobs - 1 - job) * kBand;
-    const std::size_t last = std::min(first + kBand, views);
-    Band band(first, last);
+    Differences differences(block_size);
     for (const CodedPosition& position : code.positions)
-      add_position(position, views, first, last, block_size, band);
-    band.write(gram);
+      add_position(position, first, std::min(first + kBand, views), differences, gram);
     meter.finished(1);
   });
+  sum_up(gram);
+  gram *= sta_step * sta_step;
   return gram;
 }
 
