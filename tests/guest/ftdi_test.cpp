@@ -32,31 +32,40 @@ using testing::HasSubstr;
 constexpr int slowness = 5;
 constexpr Duration return_time = 2s;  ///< within which a device that is back must work again
 
+bool eventually(const std::function<bool()>& condition, Duration patience = slowness * 10s) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (std::chrono::steady_clock::now() < end) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(10ms);
+  }
+  return false;
+}
+
 /// The hand on the plug: the hub's port is switched off and on.
 class Plug {
  public:
   Plug() {
     const auto devices = list_ftdi_devices();
     if (devices.size() != 1) return;
-    const std::string path = "/sys/bus/usb/devices/" + devices.front().bus_path + "/port";
-    port_ = std::filesystem::canonical(path) / "disable";
+    device_ = "/sys/bus/usb/devices/" + devices.front().bus_path;
+    port_ = std::filesystem::canonical(device_ / "port") / "disable";
   }
   ~Plug() { in(); }
   void out() const { std::ofstream(port_) << "1" << std::flush; }
-  void in() const { std::ofstream(port_) << "0" << std::flush; }
+  /// Returns when the kernel has the device. The hub may miss a change that comes while it serves the last
+  /// one; then the plug is put in once more.
+  void in() const {
+    for (int attempt = 0; attempt < 10; ++attempt) {
+      std::ofstream(port_) << "0" << std::flush;
+      if (eventually([this] { return std::filesystem::exists(device_ / "idVendor"); }, slowness * 1s)) return;
+      out();
+    }
+  }
 
  private:
+  std::filesystem::path device_;
   std::filesystem::path port_;
 };
-
-bool eventually(const std::function<bool()>& condition) {
-  const auto patience = std::chrono::steady_clock::now() + slowness * 10s;
-  while (std::chrono::steady_clock::now() < patience) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(10ms);
-  }
-  return false;
-}
 
 std::size_t open_descriptors() {
   std::size_t count = 0;
@@ -65,6 +74,7 @@ std::size_t open_descriptors() {
 }
 
 /// What is allocated and not freed. (Not what is resident: that grows with every page that is touched first.)
+/// What threads keep for themselves of what was freed counts as allocated, so glibc is told to keep nothing.
 std::size_t heap_bytes() {
   return mallinfo2().uordblks;
 }
