@@ -9,6 +9,7 @@
 
 #include "core/base/angle.h"
 #include "core/image/image_set.h"
+#include "core/model/model_file.h"
 #include "tests/daemon/lab_service.h"
 
 namespace eigenpose {
@@ -46,8 +47,8 @@ bool has_part_files(const std::filesystem::path& folder) {
   return false;
 }
 
-TEST(SimulatedLab, AcquiresLearnsAndSaysWhatStandsThereAndHowItIsTurned) {
-  LabService lab(small_lab + table_at("simulated"));
+/// Acquires a duck and a car, and learns them.
+void learn_duck_and_car(LabService& lab) {
   for (const char* object : {"duck", "car"}) {
     const JobStatus job = lab.acquire(object);
     ASSERT_EQ(job.state, JobState::done) << job.error;
@@ -55,10 +56,11 @@ TEST(SimulatedLab, AcquiresLearnsAndSaysWhatStandsThereAndHowItIsTurned) {
   }
   const JobStatus learned = lab.learn();
   ASSERT_EQ(learned.state, JobState::done) << learned.error;
-  EXPECT_TRUE(std::filesystem::exists(lab.config().model_file()));
+}
 
-  // Between two learned poses, which are 15 degrees apart; small pictures, so a coarse bound.
-  constexpr double pose_bound_deg = 5.0;
+/// Puts them on the table one after the other, turned between two learned poses, which are 15 degrees apart.
+void expect_duck_and_car_recognized(LabService& lab) {
+  constexpr double pose_bound_deg = 5.0;  // small pictures, so a coarse bound
   for (const auto& [object, yaw_deg] : {std::pair{"duck", 52.0}, {"car", 203.0}}) {
     const nlohmann::json result = lab.seen_after([&] {
       lab.lab().clear();
@@ -71,6 +73,13 @@ TEST(SimulatedLab, AcquiresLearnsAndSaysWhatStandsThereAndHowItIsTurned) {
     EXPECT_LT(std::abs(circular_difference(outcome.at("pose").at("table_deg").get<double>(), yaw_deg, 360.0)),
               pose_bound_deg);
   }
+}
+
+TEST(SimulatedLab, AcquiresLearnsAndSaysWhatStandsThereAndHowItIsTurned) {
+  LabService lab(small_lab + table_at("simulated"));
+  ASSERT_NO_FATAL_FAILURE(learn_duck_and_car(lab));
+  EXPECT_TRUE(std::filesystem::exists(lab.config().model_file()));
+  ASSERT_NO_FATAL_FAILURE(expect_duck_and_car_recognized(lab));
   const nlohmann::json empty = lab.seen_after([&] { lab.lab().clear(); });
   EXPECT_TRUE(empty.at("outcomes").empty()) << "an empty table is no object: " << empty.dump();
 
@@ -78,6 +87,13 @@ TEST(SimulatedLab, AcquiresLearnsAndSaysWhatStandsThereAndHowItIsTurned) {
   for (const nlohmann::json& outcome : hand.at("outcomes"))
     EXPECT_NE(outcome.at("verdict"), "recognized") << "a hand is no object: " << hand.dump();
   EXPECT_FALSE(has_part_files(lab.config().daemon.state_dir));
+}
+
+TEST(SimulatedLab, LearnsAndWatchesByTheImageTypeThatItsConfigurationNames) {
+  LabService lab("[learn]\ntype = \"gradient\"\n" + small_lab + table_at("simulated"));
+  ASSERT_NO_FATAL_FAILURE(learn_duck_and_car(lab));
+  EXPECT_EQ(image_type_name(load_model(lab.config().model_file()).normalization), "gradient");
+  expect_duck_and_car_recognized(lab);
 }
 
 TEST(SimulatedLab, AnAbsentModbusServerEndsInAClearErrorAndNothingIsLost) {
