@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -221,6 +222,10 @@ void take_face(Shape& shape, double* b, int axis, bool last) {
 /// A descent that only bounds what others must stay below ends when it is this near to its minimum.
 constexpr double rough_share = 1e-3;
 
+/// Pieces to be looked at before a descent is tried on one that is not convex; then after twice as many, and
+/// so on.
+constexpr std::size_t patience = 64;
+
 /// Slopes smaller than this many times the rounding of a coefficient may be 0.
 constexpr double sure_slope = 16.0;
 
@@ -348,8 +353,12 @@ Minimum minimize(const Shape& shape, const double* coefficients, double cut, dou
     best.value = value;
     for (int a = 0; a < m; ++a) best.u[a] = std::clamp(piece.start[a] + u[a] * piece.width[a], 0.0, 1.0);
   };
+  // No squared distance is below 0: what is found at about 0 is the answer. Else a set of zeros (more axes
+  // than dimensions) would be cut into pieces without end: none of them can be left out, none is convex.
+  const double zero = distance_tolerance * distance_tolerance + 4.0 * rounding;
   bool first = true;
-  while (count > 0) {
+  std::size_t looked = 0;
+  while (count > 0 && (first || best.value > zero)) {
     Piece piece = pieces[--count];
     double* b = scratch.level(count, size);
     std::size_t used = piece.shape.size();
@@ -366,17 +375,20 @@ Minimum minimize(const Shape& shape, const double* coefficients, double cut, dou
       if (depends[a] > depends[widest]) widest = a;
     const bool convex =
         !outside && is_convex(piece.shape, b, depends, rounding, scratch.level(max_halvings + 2, size));
-    if (convex || first) {
+    // Where many pieces are not convex, a better value now and then leaves many of them out.
+    const bool again = ++looked >= patience && std::has_single_bit(looked);
+    if (convex || first || again) {
       // Of a patch that is left out, the lowest place of its face still bounds what others must stay below.
-      const double enough = convex ? rounding : rough_share * std::abs(b[lowest]) + rounding;
+      const double enough = first && !convex ? rough_share * std::abs(b[lowest]) + rounding : rounding;
       const Descent end = descend(piece.shape, b, place_of(piece.shape, lowest), enough);
       offer(piece, end.u, end.value);
       if (outside || (convex && end.value - end.gap > worthwhile() - rounding)) continue;
     }
     first = false;
     if (depends[widest] <= rounding || piece.width[widest] < 1e-12 || count + 2 > max_halvings) {
-      // Smaller than double resolves: any point of it is the answer.
-      offer(piece, Vector{}, b[0]);
+      // So small that its polynomial is as good as quadratic: what a descent finds there is the answer.
+      const Descent end = descend(piece.shape, b, place_of(piece.shape, lowest), rounding);
+      offer(piece, end.u, end.value);
       continue;
     }
     double* high = scratch.level(count + 1, size);

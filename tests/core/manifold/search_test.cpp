@@ -151,6 +151,19 @@ TEST_P(EverySearch, FindsAManifoldThatIsASinglePoint) {
   EXPECT_NEAR(found[0].distance, place.norm(), 1e-12);
 }
 
+TEST_P(EverySearchButTheOracle, EndsWhereAManifoldFillsItsSpace) {
+  // More DOFs than dimensions: a point inside is met on whole curves of places.
+  std::mt19937 random(12);
+  std::vector<SampleAxis> axes = {synthetic::axis("a", 8, true, false, random)};
+  axes.push_back(synthetic::axis("b", 4, false, false, random));
+  axes.push_back(synthetic::axis("c", 4, false, false, random));
+  const std::vector<Manifold> manifolds = {synthetic::smooth_manifold(axes, 2, 2, random, 2)};
+  const auto search = make_search(GetParam(), manifolds);
+  const Eigen::VectorXf inside = manifolds[0].evaluate({{100.0, 1.3, 0.7}}).cast<float>();
+  ASSERT_EQ(search->nearest(inside).size(), 1U);
+  EXPECT_LT(search->nearest(inside)[0].distance, promised);
+}
+
 TEST_P(EverySearch, RefusesAPointOfAnotherSize) {
   std::mt19937 random(9);
   const std::vector<Manifold> manifolds = {synthetic::smooth_curve(8, 5, 2, random)};
