@@ -173,7 +173,7 @@ at = [0.0, 20.0]
 axis = "table"
 from = 0.0
 to = 360.0
-count = 3
+count = 2
 [watch]
 enabled = false
 )";
@@ -197,7 +197,7 @@ enabled = false
   void check_views(const std::string& object) {
     const ImageSet set = ImageSet::open(folder_ / "state/sets" / object);
     EXPECT_TRUE(set.complete());
-    ASSERT_EQ(set.views().size(), 6U);
+    ASSERT_EQ(set.views().size(), 4U);
     for (std::size_t i = 0; i < set.views().size(); ++i) {
       cv::Mat view = set.load(i);
       if (view.channels() == 3) cv::cvtColor(view, view, cv::COLOR_BGR2GRAY);
