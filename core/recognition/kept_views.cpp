@@ -99,6 +99,15 @@ auto with_hdf5(const std::filesystem::path& file, const Work& work) {
   }
 }
 
+ConfigError not_there(const KeptViews& kept, const std::string& name) {
+  std::string text = "there is no object \"" + name + "\" to remove; there are:";
+  for (const ObjectViews& object : kept.objects()) {
+    text += object.first == 0 ? " " : ", ";
+    text += object.object;
+  }
+  return ConfigError(text);
+}
+
 std::filesystem::path checked(std::filesystem::path file) {
   if (!std::filesystem::exists(file))
     throw FileError(file, "there are no kept views; " + std::string(views_format.remedy));
@@ -193,15 +202,10 @@ void KeptViewsWriter::commit() {
 
 std::vector<TrainingSet> updated_sets(const KeptViews& kept, std::span<const std::string> leaving,
                                       std::span<const ImageSet> joining) {
-  std::string known;
-  for (const ObjectViews& object : kept.objects()) {
-    if (!known.empty()) known += ", ";
-    known += object.object;
-  }
   for (const std::string& name : leaving)
     if (std::none_of(kept.objects().begin(), kept.objects().end(),
                      [&](const ObjectViews& object) { return object.object == name; }))
-      throw ConfigError("there is no object \"" + name + "\" to remove; there are: " + known);
+      throw not_there(kept, name);
   std::vector<TrainingSet> sets;
   for (std::size_t o = 0; o < kept.objects().size(); ++o)
     if (std::find(leaving.begin(), leaving.end(), kept.objects()[o].object) == leaving.end())
