@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "core/image/image_type.h"
-#include "core/image/resize_kernels.h"
+#include "core/image/normalization_kernels.h"
 
 namespace eigenpose {
 namespace {
@@ -237,10 +237,8 @@ void shrink_appearance(std::span<const float> appearance, int size, int bands, i
 }
 
 void quantize(std::span<const float> picture, std::span<std::uint8_t> bytes) {
-  const float largest = *std::max_element(picture.begin(), picture.end());
-  const float gain = largest > 0.0F ? 255.0F / largest : 0.0F;
-  for (std::size_t i = 0; i < picture.size(); ++i)
-    bytes[i] = static_cast<std::uint8_t>(std::lround(picture[i] * gain));
+  const float largest = largest_of(picture.data(), picture.size());
+  round_scaled(picture.data(), largest > 0.0F ? 255.0F / largest : 0.0F, picture.size(), bytes.data());
 }
 
 }  // namespace eigenpose

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <Eigen/LU>
 
@@ -54,7 +55,8 @@ void PoseAligner::project(const PoseScale& scale, const PosePicture& picture, co
   scale.warp(picture, p, true, warped_);
   projected_.resize(scale.basis.cols(), warped_.cols());
   multiply_transposed_six(scale.basis.data(), static_cast<int>(scale.basis.rows()),
-                          static_cast<int>(scale.basis.cols()), warped_.data(), projected_.data());
+                          static_cast<int>(scale.basis.cols()), warped_.data(), projected_.data(),
+                          static_cast<int>(scale.basis.cols()));
   projected_.col(0) -= scale.mean;
   prepare(p);
 }
@@ -114,7 +116,7 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
       }
     }
     cost_at(space.samples().col(static_cast<Eigen::Index>(found)).data(), &x);
-    const bool settled = found == here && round > 0 && lowest > best - 1e-3 * options_.noise - 1e-3 * best;
+    const bool settled = found == here && round > 0 && lowest > best - 3e-2 * options_.noise - 3e-2 * best;
     here = found;
     best = lowest;
     Vector5 moved = as_vector(p) + x;
@@ -213,8 +215,14 @@ const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, c
     }
   }
   if (options_.fine && poses_.size() > 1) {
-    for (AlignedPose& pose : poses_) {
-      pose.fine_cost = fine_cost(picture, space, pose);
+    std::sort(poses_.begin(), poses_.end(),
+              [](const AlignedPose& a, const AlignedPose& b) { return a.cost < b.cost; });
+    AlignedPose& best = poses_.front();
+    best.fine_cost = fine_cost(picture, space, best);
+    const double finer = best.fine_cost - best.cost;
+    for (AlignedPose& pose : std::span(poses_).subspan(1)) {
+      const bool close = pose.cost < best.cost + options_.close * options_.noise;
+      pose.fine_cost = close ? fine_cost(picture, space, pose) : pose.cost + finer;
     }
   }
   std::stable_sort(poses_.begin(), poses_.end(),

@@ -37,6 +37,7 @@ struct AlignmentOptions {
   int rounds = 6;  ///< Gauss–Newton rounds each
   double reach = 20.0 / 360;  ///< how far a round may move the pose, as a share of a periodic DOF's range
   bool fine = true;           ///< compare the ends at the fine scale
+  double close = 40.0;  ///< ends higher than the deepest by more than this times ν are as bad there too
 };
 
 /// One pose that fits a region.
@@ -44,7 +45,7 @@ struct AlignedPose {
   std::vector<double> q;
   Misalignment misalignment;
   double cost = 0.0;            ///< squared distance after alignment plus νpᵀΛp, coarse scale
-  double fine_cost = 0.0;       ///< the same at the fine scale where it was compared, else the coarse one
+  double fine_cost = 0.0;       ///< the same at the fine scale, where poses are compared there
   std::vector<double> q_sigma;  ///< 1 σ of each DOF from the curvature of the cost
 };
 

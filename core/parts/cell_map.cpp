@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
@@ -44,93 +45,108 @@ const std::array<Share, CellMap::pixels>& shares() {
   return table;
 }
 
-/// Orientation of (x, y) in bins, 0…8: atan2 with an error below 0.004 bins.
+/// Orientation of (x, y) in bins, 0…8: atan2 with an error below 0.004 bins. Without branches, so that
+/// neighbouring pixels are done together.
 inline float orientation_in_bins(float x, float y) {
   const float ax = std::fabs(x);
   const float ay = std::fabs(y);
-  const float ratio = std::min(ax, ay) / std::max(std::max(ax, ay), 1e-12F);
+  const float larger = ax > ay ? ax : ay;
+  const float smaller = ax > ay ? ay : ax;
+  const float ratio = smaller / (larger > 1e-12F ? larger : 1e-12F);
   const float square = ratio * ratio;
-  float angle = ((-0.0464964749F * square + 0.15931422F) * square - 0.327622764F) * square * ratio + ratio;
   constexpr auto pi = std::numbers::pi_v<float>;
-  if (ay > ax) {
-    angle = 0.5F * pi - angle;
-  }
-  if (x < 0.0F) {
-    angle = pi - angle;
-  }
-  if (y < 0.0F) {
-    angle = 2.0F * pi - angle;
-  }
+  float angle = ((-0.0464964749F * square + 0.15931422F) * square - 0.327622764F) * square * ratio + ratio;
+  angle = ay > ax ? 0.5F * pi - angle : angle;
+  angle = x < 0.0F ? pi - angle : angle;
+  angle = y < 0.0F ? 2.0F * pi - angle : angle;
   return angle * (static_cast<float>(CellMap::bins) / (2.0F * pi));
 }
 
-/// Sobel gradient of the strongest band, /8, borders repeated.
+/// A row of gradients: of the strongest band, as orientation and magnitude.
+struct GradientRow {
+  std::array<float, CellMap::pixels> place{};      ///< orientation in bins, 0…8
+  std::array<float, CellMap::pixels> magnitude{};  ///< of the Sobel gradient, /8
+};
+
+/// @param above, here, below rows of root brightness that begin one pixel before the first, borders repeated.
 template <int Bands>
-inline void strongest_gradient(const float* above, const float* here, const float* below, int left,
-                               int middle, int right, float& gx, float& gy) {
-  float strongest = -1.0F;
-  for (int b = 0; b < Bands; ++b) {
-    const float al = above[left * Bands + b];
-    const float ar = above[right * Bands + b];
-    const float bl = below[left * Bands + b];
-    const float br = below[right * Bands + b];
-    const float x = (ar - al + 2.0F * (here[right * Bands + b] - here[left * Bands + b]) + br - bl) * 0.125F;
-    const float y =
-        (bl - al + 2.0F * (below[middle * Bands + b] - above[middle * Bands + b]) + br - ar) * 0.125F;
-    const float magnitude = x * x + y * y;
-    if (magnitude > strongest) {
-      strongest = magnitude;
-      gx = x;
-      gy = y;
+void find_gradients(const float* above, const float* here, const float* below, GradientRow& row) {
+  for (std::size_t c = 0; c < CellMap::pixels; ++c) {
+    const std::size_t left = c * Bands;
+    float gx = 0.0F;
+    float gy = 0.0F;
+    float strongest = -1.0F;
+    for (std::size_t b = 0; b < Bands; ++b) {
+      const std::size_t l = left + b;
+      const std::size_t m = l + Bands;
+      const std::size_t r = m + Bands;
+      const float x = (above[r] - above[l] + 2.0F * (here[r] - here[l]) + below[r] - below[l]) * 0.125F;
+      const float y = (below[l] - above[l] + 2.0F * (below[m] - above[m]) + below[r] - above[r]) * 0.125F;
+      const float squared = x * x + y * y;
+      const bool stronger = squared > strongest;
+      gx = stronger ? x : gx;
+      gy = stronger ? y : gy;
+      strongest = stronger ? squared : strongest;
     }
+    row.place[c] = orientation_in_bins(gx, gy);
+    row.magnitude[c] = strongest;
   }
+  for (float& magnitude : row.magnitude) magnitude = std::sqrt(magnitude);
 }
+
+/// One row of pixels between the columns of cells; the first and the last place lie outside.
+template <int Bands>
+struct RowSums {
+  static constexpr std::size_t places = CellMap::cells + 2;
+  std::array<float, places * CellMap::bins> orientation{};
+  std::array<float, places * Bands> brightness{};
+};
 
 template <int Bands>
 void fill(const std::vector<float>& root, CellMap& map) {
   constexpr int n = CellMap::pixels;
-  constexpr int bins = CellMap::bins;
+  constexpr std::size_t bins = CellMap::bins;
+  constexpr std::size_t cells = CellMap::cells;
+  constexpr std::ptrdiff_t stride = std::ptrdiff_t{n + 2} * Bands;
   // Pixels outside have no share in a cell; a cell weight sums to 1 over its 8×8 pixels.
   constexpr float norm = 1.0F / (CellMap::cell * CellMap::cell);
   const auto& share = shares();
+  GradientRow gradients;
   for (int r = 0; r < n; ++r) {
-    const float* above = root.data() + static_cast<std::ptrdiff_t>(std::max(r - 1, 0)) * n * Bands;
-    const float* here = root.data() + static_cast<std::ptrdiff_t>(r) * n * Bands;
-    const float* below = root.data() + static_cast<std::ptrdiff_t>(std::min(r + 1, n - 1)) * n * Bands;
-    const Share row = share[static_cast<std::size_t>(r)];
-    for (int c = 0; c < n; ++c) {
-      float gx = 0.0F;
-      float gy = 0.0F;
-      strongest_gradient<Bands>(above, here, below, std::max(c - 1, 0), c, std::min(c + 1, n - 1), gx, gy);
-      const float magnitude = std::sqrt(gx * gx + gy * gy) * norm;
-      const Share column = share[static_cast<std::size_t>(c)];
-      const bool lit = magnitude > 0.0F;
-      const float place = lit ? orientation_in_bins(gx, gy) : 0.0F;
-      const int whole = static_cast<int>(place);
-      const float part = place - static_cast<float>(whole);
-      const int bin = whole & (bins - 1);
-      const int next = (bin + 1) & (bins - 1);
-      for (int i = 0; i < 2; ++i) {
-        const float row_weight = i == 0 ? row.weight : 1.0F - row.weight;
-        for (int j = 0; j < 2; ++j) {
-          const int cell_row = row.first + i;
-          const int cell_column = column.first + j;
-          if (cell_row < 0 || cell_row >= CellMap::cells || cell_column < 0 ||
-              cell_column >= CellMap::cells) {
-            continue;
-          }
-          const float weight = row_weight * (j == 0 ? column.weight : 1.0F - column.weight);
-          const auto at = static_cast<std::size_t>((cell_row + CellMap::pad) * CellMap::side + cell_column +
-                                                   CellMap::pad);
-          if (lit) {
-            map.orientation[at * bins + static_cast<std::size_t>(bin)] += weight * magnitude * (1.0F - part);
-            map.orientation[at * bins + static_cast<std::size_t>(next)] += weight * magnitude * part;
-          }
-          for (int b = 0; b < Bands; ++b) {
-            map.brightness[at * Bands + static_cast<std::size_t>(b)] += weight * norm * here[c * Bands + b];
-          }
-        }
+    const float* here = root.data() + r * stride;
+    find_gradients<Bands>(root.data() + std::max(r - 1, 0) * stride, here,
+                          root.data() + std::min(r + 1, n - 1) * stride, gradients);
+    RowSums<Bands> sums;
+    for (std::size_t c = 0; c < n; ++c) {
+      const auto cell = static_cast<std::size_t>(share[c].first + 1);
+      const float near = share[c].weight * norm;
+      const float far = (1.0F - share[c].weight) * norm;
+      const int whole = static_cast<int>(gradients.place[c]);
+      const float part = gradients.place[c] - static_cast<float>(whole);
+      const auto bin = static_cast<std::size_t>(whole) & (bins - 1);
+      const auto next = (bin + 1) & (bins - 1);
+      const float second = gradients.magnitude[c] * part;
+      const float first = gradients.magnitude[c] - second;
+      float* orientation = sums.orientation.data() + cell * bins;
+      orientation[bin] += near * first;
+      orientation[next] += near * second;
+      orientation[bins + bin] += far * first;
+      orientation[bins + next] += far * second;
+      for (std::size_t b = 0; b < Bands; ++b) {
+        const float level = here[(c + 1) * Bands + b];
+        sums.brightness[cell * Bands + b] += near * level;
+        sums.brightness[(cell + 1) * Bands + b] += far * level;
       }
+    }
+    const Share row = share[static_cast<std::size_t>(r)];
+    for (const auto& [cell_row, weight] :
+         {std::pair(row.first, row.weight), {row.first + 1, 1.0F - row.weight}}) {
+      if (cell_row < 0 || cell_row >= CellMap::cells) continue;
+      const auto at = static_cast<std::size_t>((cell_row + CellMap::pad) * CellMap::side + CellMap::pad);
+      for (std::size_t i = 0; i < cells * bins; ++i)
+        map.orientation[at * bins + i] += weight * sums.orientation[bins + i];
+      for (std::size_t i = 0; i < cells * Bands; ++i)
+        map.brightness[at * Bands + i] += weight * sums.brightness[Bands + i];
     }
   }
 }
@@ -150,15 +166,19 @@ void CellMapper::compute(const cv::Mat& picture, CellMap& map) {
     source = &resized_;
   }
   const int bands = source->channels();
-  const std::size_t row_length = static_cast<std::size_t>(CellMap::pixels) * static_cast<std::size_t>(bands);
-  root_.resize(row_length * CellMap::pixels);
+  // One pixel more on either side, which repeats the border.
+  const auto band_count = static_cast<std::size_t>(bands);
+  const std::size_t row_length = CellMap::pixels * band_count;
+  root_.resize((row_length + 2 * band_count) * CellMap::pixels);
   const auto& table = root_table();
   for (int r = 0; r < CellMap::pixels; ++r) {
     const std::uint8_t* bytes = source->ptr<std::uint8_t>(r);
-    float* out = root_.data() + static_cast<std::size_t>(r) * row_length;
+    float* out = root_.data() + static_cast<std::size_t>(r) * (row_length + 2 * band_count) + band_count;
     for (std::size_t i = 0; i < row_length; ++i) {
       out[i] = table[bytes[i]];
     }
+    std::copy_n(out, band_count, out - band_count);
+    std::copy_n(out + row_length - band_count, band_count, out + row_length);
   }
   constexpr auto places = static_cast<std::size_t>(CellMap::side) * CellMap::side;
   map.bands = bands;

@@ -51,37 +51,58 @@ __attribute__((target("avx2,fma"))) float dot_avx2(const float* a, const float* 
   return sum;
 }
 
-void six_portable(const float* matrix, int rows, int columns, const float* vectors, float* out) {
+void six_portable(const float* matrix, int rows, int columns, const float* vectors, float* out, int stride) {
   for (int k = 0; k < columns; ++k) {
     for (int v = 0; v < 6; ++v) {
-      out[v * columns + k] =
+      out[v * stride + k] =
           dot_portable(matrix + static_cast<long>(k) * rows, vectors + static_cast<long>(v) * rows, rows);
     }
   }
 }
 
-__attribute__((target("avx2,fma"))) void six_avx2(const float* matrix, int rows, int columns,
-                                                  const float* vectors, float* out) {
-  for (int k = 0; k < columns; ++k) {
-    const float* column = matrix + static_cast<long>(k) * rows;
-    __m256 sums[6];
-    for (__m256& sum : sums) {
+/// `Together` columns from `matrix` on, so that a vector's numbers are loaded once for them.
+template <int Together>
+__attribute__((target("avx2,fma"))) inline void six_columns_avx2(const float* matrix, int rows,
+                                                                 const float* vectors, float* out,
+                                                                 int stride) {
+  __m256 sums[Together][6];
+  for (auto& column : sums) {
+    for (__m256& sum : column) {
       sum = _mm256_setzero_ps();
     }
-    int i = 0;
-    for (; i + 8 <= rows; i += 8) {
-      const __m256 m = _mm256_loadu_ps(column + i);
-      for (int v = 0; v < 6; ++v) {
-        sums[v] = _mm256_fmadd_ps(m, _mm256_loadu_ps(vectors + static_cast<long>(v) * rows + i), sums[v]);
-      }
+  }
+  int i = 0;
+  for (; i + 8 <= rows; i += 8) {
+    __m256 m[Together];
+    for (int k = 0; k < Together; ++k) {
+      m[k] = _mm256_loadu_ps(matrix + static_cast<long>(k) * rows + i);
     }
     for (int v = 0; v < 6; ++v) {
-      float sum = horizontal_sum(sums[v]);
-      for (int rest = i; rest < rows; ++rest) {
-        sum += column[rest] * vectors[static_cast<long>(v) * rows + rest];
+      const __m256 vector = _mm256_loadu_ps(vectors + static_cast<long>(v) * rows + i);
+      for (int k = 0; k < Together; ++k) {
+        sums[k][v] = _mm256_fmadd_ps(m[k], vector, sums[k][v]);
       }
-      out[v * columns + k] = sum;
     }
+  }
+  for (int k = 0; k < Together; ++k) {
+    for (int v = 0; v < 6; ++v) {
+      float sum = horizontal_sum(sums[k][v]);
+      for (int rest = i; rest < rows; ++rest) {
+        sum += matrix[static_cast<long>(k) * rows + rest] * vectors[static_cast<long>(v) * rows + rest];
+      }
+      out[v * stride + k] = sum;
+    }
+  }
+}
+
+__attribute__((target("avx2,fma"))) void six_avx2(const float* matrix, int rows, int columns,
+                                                  const float* vectors, float* out, int stride) {
+  int k = 0;
+  for (; k + 2 <= columns; k += 2) {
+    six_columns_avx2<2>(matrix + static_cast<long>(k) * rows, rows, vectors, out + k, stride);
+  }
+  if (k < columns) {
+    six_columns_avx2<1>(matrix + static_cast<long>(k) * rows, rows, vectors, out + k, stride);
   }
 }
 
@@ -145,8 +166,9 @@ void multiply_transposed(const float* matrix, int rows, int columns, const float
   }
 }
 
-void multiply_transposed_six(const float* matrix, int rows, int columns, const float* vectors, float* out) {
-  chosen_six(matrix, rows, columns, vectors, out);
+void multiply_transposed_six(const float* matrix, int rows, int columns, const float* vectors, float* out,
+                             int stride) {
+  chosen_six(matrix, rows, columns, vectors, out, stride);
 }
 
 void residual_products(const float* point, const float* frame, int n, float& squared, float* products) {

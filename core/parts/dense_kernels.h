@@ -9,9 +9,10 @@ namespace eigenpose {
 /// gaps).
 void multiply_transposed(const float* matrix, int rows, int columns, const float* vector, float* out);
 
-/// out (columns × 6, column-major) = matrixᵀ · vectors, for six vectors of `rows` floats that stand one after
-/// the other.
-void multiply_transposed_six(const float* matrix, int rows, int columns, const float* vectors, float* out);
+/// out (columns × 6, column-major, `stride` floats from column to column) = matrixᵀ · vectors, for six
+/// vectors of `rows` floats that stand one after the other.
+void multiply_transposed_six(const float* matrix, int rows, int columns, const float* vectors, float* out,
+                             int stride);
 
 /// With r = point − f: squared = ‖r‖² and products[i] = r·Jᵢ, where f and the five J stand one after the
 /// other in `frame`, n floats each.

@@ -72,19 +72,19 @@ void MaskedAligner::prepare(const Misalignment& misalignment, double first_gain)
   weighted_.col(0) = weights_.cwiseProduct(space_->pixel_mean() - warped_.col(0));
   weighted_.rightCols(5) = warped_.rightCols(5).array().colwise() * weights_.array();
   weighted_basis_ = basis.array().colwise() * weights_.array();
-  // Six columns at a time; the last ones again where D is no multiple of six.
+  // Its lower half, six columns at a time; the last ones again where D is no multiple of six.
   quadratic_.resize(dims, dims);
   if (dims < 6) {
     quadratic_.noalias() = basis.transpose() * weighted_basis_;
   } else {
     for (int first = 0; first < dims; first += 6) {
       const int from = std::min(first, dims - 6);
-      multiply_transposed_six(basis.data(), pixels, dims, weighted_basis_.col(from).data(),
-                              quadratic_.col(from).data());
+      multiply_transposed_six(basis.col(from).data(), pixels, dims - from, weighted_basis_.col(from).data(),
+                              quadratic_.col(from).data() + from, dims);
     }
   }
   linear_.resize(dims, 6);
-  multiply_transposed_six(basis.data(), pixels, dims, weighted_.data(), linear_.data());
+  multiply_transposed_six(basis.data(), pixels, dims, weighted_.data(), linear_.data(), dims);
   const Eigen::VectorXf difference = space_->pixel_mean() - warped_.col(0);
   constant_ = static_cast<double>(weighted_.col(0).dot(difference));
   constant_products_ = (weighted_.rightCols(5).transpose() * difference).cast<double>();

@@ -100,11 +100,12 @@ struct PartsRecognizer::Impl {
   QueryWindows windows;  ///< of the picture, once they were asked for
   bool windows_made = false;
   QueryWindows aligned_windows;
-  PosePicture pose_picture;
-  std::vector<PartialVote> votes;
+  PosePicture pose_picture;  ///< likewise
+  bool pose_picture_made = false;
   std::vector<float> likeness;
   std::vector<float> background;
 
+  const PosePicture& posed();
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   double foreign_share(std::size_t object, int candidate);
   void find_poses(std::size_t object, const std::vector<float>& plain, PartsAnswer& answer);
@@ -114,6 +115,12 @@ struct PartsRecognizer::Impl {
                                                int candidate) const;
   [[nodiscard]] std::vector<float> pixel_trust() const;
 };
+
+const PosePicture& PartsRecognizer::Impl::posed() {
+  if (!pose_picture_made) make_pose_picture(picture, pose_picture);
+  pose_picture_made = true;
+  return pose_picture;
+}
 
 double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const PartsPose& pose) {
   undo(picture, pose.misalignment, aligned);
@@ -168,7 +175,7 @@ void PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<flo
   const auto merit = [&](const PartsPose& pose) {
     return window_count * pose.votes - 0.5 * pose.cost / model.noise;
   };
-  for (const AlignedPose& found : aligner.align(pose_picture, space)) {
+  for (const AlignedPose& found : aligner.align(posed(), space)) {
     PartsPose pose{found.q, found.q_sigma, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
                    0.0};
     pose.votes = votes_near(plain, parts, space, pose.q) / windows.total_weight;
@@ -234,7 +241,7 @@ void PartsRecognizer::Impl::find_covered_poses(std::size_t object, const std::ve
   // What the best view trusts is what all poses are compared on.
   foreign_share(object, peaks.front());
   const std::vector<float> trust = pixel_trust();
-  masked_aligner.look(pose_picture, model.poses[object], trust);
+  masked_aligner.look(posed(), model.poses[object], trust);
   for (const int peak : peaks) {
     const auto [found, unexplained] = masked_aligner.follow(voted_pose(object, plain, peak), masked_reach);
     PartsPose pose{found.q,
@@ -263,12 +270,12 @@ void PartsRecognizer::look(const cv::Mat& picture) {
   } else {
     cv::resize(picture, impl_->picture, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
   }
-  make_pose_picture(impl_->picture, impl_->pose_picture);
   impl_->windows_made = false;
+  impl_->pose_picture_made = false;
 }
 
-const PosePicture& PartsRecognizer::pose_picture() const {
-  return impl_->pose_picture;
+const PosePicture& PartsRecognizer::pose_picture() {
+  return impl_->posed();
 }
 
 std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> shortlist) {
@@ -282,8 +289,9 @@ std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> 
       impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
 }
 
-double PartsRecognizer::total_weight() const {
-  return impl_->windows.total_weight;
+double PartsRecognizer::share_of(std::size_t object) const {
+  const std::vector<float> plain = impl_->matcher.plain_votes(impl_->windows, object);
+  return static_cast<double>(*std::ranges::max_element(plain) / impl_->windows.total_weight);
 }
 
 PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {

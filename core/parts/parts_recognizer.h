@@ -54,11 +54,12 @@ class PartsRecognizer {
   /// Takes a square 8-bit picture with the model's bands. Call before the others.
   void look(const cv::Mat& picture);
   /// The picture looked at, ready for alignment.
-  [[nodiscard]] const PosePicture& pose_picture() const;
+  [[nodiscard]] const PosePicture& pose_picture();
   /// Votes of all objects (or of `shortlist`), most first.
   std::span<const PartialVote> vote(std::span<const std::size_t> shortlist = {});
-  /// Weight of all windows of the picture looked at, once it has been voted on.
-  [[nodiscard]] double total_weight() const;
+  /// Share of the windows' weight that the best view of one object gets, background or not, 0…1. Once the
+  /// picture looked at has been voted on.
+  [[nodiscard]] double share_of(std::size_t object) const;
   /// Pose of one object in the picture looked at, once it has been voted on.
   /// @param covered take it as covered, whatever its windows say: merits of such answers can be compared.
   PartsAnswer settle(std::size_t object, bool covered = false);

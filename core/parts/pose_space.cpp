@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
@@ -25,21 +26,32 @@ constexpr std::size_t most_samples = 4096;
 struct Sampler {
   const float* texels;
 
-  [[nodiscard]] __m128 at(float x, float y) const {
-    constexpr auto last = static_cast<float>(PosePicture::side - 1);
-    constexpr std::ptrdiff_t row = std::ptrdiff_t{4} * PosePicture::side;
-    x = std::clamp(x, 0.0F, last);
-    y = std::clamp(y, 0.0F, last);
-    const int ix = std::min(static_cast<int>(x), PosePicture::side - 2);
-    const int iy = std::min(static_cast<int>(y), PosePicture::side - 2);
-    const __m128 fx = _mm_set1_ps(x - static_cast<float>(ix));
-    const __m128 fy = _mm_set1_ps(y - static_cast<float>(iy));
-    const float* p = texels + iy * row + std::ptrdiff_t{4} * ix;
-    const __m128 left = _mm_loadu_ps(p);
-    const __m128 below = _mm_loadu_ps(p + row);
-    const __m128 top = _mm_add_ps(left, _mm_mul_ps(fx, _mm_sub_ps(_mm_loadu_ps(p + 4), left)));
-    const __m128 bottom = _mm_add_ps(below, _mm_mul_ps(fx, _mm_sub_ps(_mm_loadu_ps(p + row + 4), below)));
-    return _mm_add_ps(top, _mm_mul_ps(fy, _mm_sub_ps(bottom, top)));
+  /// Samples four places.
+  void four(__m128 x, __m128 y, __m128 (&samples)[4]) const {
+    const __m128 last = _mm_set1_ps(static_cast<float>(PosePicture::side - 1));
+    const __m128 before_last = _mm_set1_ps(static_cast<float>(PosePicture::side - 2));
+    x = _mm_min_ps(_mm_max_ps(x, _mm_setzero_ps()), last);
+    y = _mm_min_ps(_mm_max_ps(y, _mm_setzero_ps()), last);
+    const __m128i column = _mm_cvttps_epi32(_mm_min_ps(x, before_last));
+    const __m128i row = _mm_cvttps_epi32(_mm_min_ps(y, before_last));
+    alignas(16) std::array<float, 4> fx;
+    alignas(16) std::array<float, 4> fy;
+    alignas(16) std::array<std::int32_t, 4> at;
+    _mm_store_ps(fx.data(), _mm_sub_ps(x, _mm_cvtepi32_ps(column)));
+    _mm_store_ps(fy.data(), _mm_sub_ps(y, _mm_cvtepi32_ps(row)));
+    static_assert(PosePicture::side == 1 << 6);
+    _mm_store_si128(reinterpret_cast<__m128i*>(at.data()), _mm_add_epi32(_mm_slli_epi32(row, 6), column));
+    constexpr std::ptrdiff_t next_row = std::ptrdiff_t{4} * PosePicture::side;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const float* p = texels + std::ptrdiff_t{4} * at[k];
+      const __m128 across = _mm_set1_ps(fx[k]);
+      const __m128 left = _mm_loadu_ps(p);
+      const __m128 below = _mm_loadu_ps(p + next_row);
+      const __m128 top = _mm_add_ps(left, _mm_mul_ps(across, _mm_sub_ps(_mm_loadu_ps(p + 4), left)));
+      const __m128 bottom =
+          _mm_add_ps(below, _mm_mul_ps(across, _mm_sub_ps(_mm_loadu_ps(p + next_row + 4), below)));
+      samples[k] = _mm_add_ps(top, _mm_mul_ps(_mm_set1_ps(fy[k]), _mm_sub_ps(bottom, top)));
+    }
   }
 };
 
@@ -122,23 +134,28 @@ void PoseScale::warp(const PosePicture& picture, const Misalignment& misalignmen
   float* by_y = out.col(3).data();
   float* by_scale = out.col(4).data();
   float* by_rotation = out.col(5).data();
+  // Four neighbouring pixels at a time.
+  static_assert(coarse_side % 4 == 0 && fine_side % 4 == 0);
+  const __m128 shrink = _mm_set1_ps(1.0F / enlarge);
   int i = 0;
   for (int r = 0; r < side; ++r) {
     const float v = (static_cast<float>(r) + 0.5F) * step - middle;
-    for (int c = 0; c < side; ++c, ++i) {
-      const float u = (static_cast<float>(c) + 0.5F) * step - middle;
-      const float du = cosine * u - sine * v;
-      const float dv = sine * u + cosine * v;
-      const float x = cx + du;
-      const float y = cy + dv;
-      alignas(16) std::array<float, 4> sample{};
-      _mm_store_ps(sample.data(), sampler.at(x, y));
-      value[i] = sample[0];
+    for (int c = 0; c < side; c += 4, i += 4) {
+      const __m128 u = _mm_add_ps(_mm_set1_ps((static_cast<float>(c) + 0.5F) * step - middle),
+                                  _mm_mul_ps(_mm_set1_ps(step), _mm_setr_ps(0.0F, 1.0F, 2.0F, 3.0F)));
+      const __m128 du = _mm_sub_ps(_mm_mul_ps(_mm_set1_ps(cosine), u), _mm_set1_ps(sine * v));
+      const __m128 dv = _mm_add_ps(_mm_mul_ps(_mm_set1_ps(sine), u), _mm_set1_ps(cosine * v));
+      __m128 samples[4];
+      sampler.four(_mm_add_ps(_mm_set1_ps(cx), du), _mm_add_ps(_mm_set1_ps(cy), dv), samples);
+      _MM_TRANSPOSE4_PS(samples[0], samples[1], samples[2], samples[3]);
+      const __m128 gx = samples[1];
+      const __m128 gy = samples[2];
+      _mm_storeu_ps(value + i, samples[0]);
       if (derivatives) {
-        by_x[i] = n * sample[1];
-        by_y[i] = n * sample[2];
-        by_scale[i] = (sample[1] * du + sample[2] * dv) / enlarge;
-        by_rotation[i] = sample[2] * du - sample[1] * dv;
+        _mm_storeu_ps(by_x + i, _mm_mul_ps(_mm_set1_ps(n), gx));
+        _mm_storeu_ps(by_y + i, _mm_mul_ps(_mm_set1_ps(n), gy));
+        _mm_storeu_ps(by_scale + i, _mm_mul_ps(_mm_add_ps(_mm_mul_ps(gx, du), _mm_mul_ps(gy, dv)), shrink));
+        _mm_storeu_ps(by_rotation + i, _mm_sub_ps(_mm_mul_ps(gy, du), _mm_mul_ps(gx, dv)));
       }
     }
   }

@@ -11,8 +11,8 @@ namespace eigenpose {
 namespace {
 
 /// Learned sizes that differ by less than this share of the larger side are tried as one.
-constexpr double same_extent = 0.06;
-constexpr std::size_t most_extents = 64;  ///< where there are more, sizes are told apart less finely
+constexpr double same_extent = 0.12;
+constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are told apart less finely
 /// An object may reach beyond what is seen of it by this share of its side: so much may be covered.
 constexpr double most_beyond = 0.35;
 constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
@@ -129,7 +129,7 @@ bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
   return true;
 }
 
-std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline) {
+std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline, double visible) {
   std::vector<Trial> all;
   std::vector<float> picture;
   for (std::size_t e = 0; e < extents_.size(); ++e) {
@@ -144,7 +144,10 @@ std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline) {
                            size);
         if (!look(box, picture)) continue;
         const auto votes = recognizer_.vote(extents_[e].objects);
-        all.push_back({box, e, static_cast<double>(votes[0].score) / recognizer_.total_weight()});
+        const std::size_t object = votes[0].object;
+        const double share = recognizer_.share_of(object);
+        if (share >= visible * (1.0 - parts_.calibration[object].rejection_score))
+          all.push_back({box, e, share});
       }
     }
   }
@@ -172,9 +175,9 @@ FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t
   return object;
 }
 
-std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline) {
+std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double visible) {
   std::vector<FusedObject> found;
-  for (const Trial& trial : trials(outline)) {
+  for (const Trial& trial : trials(outline, visible)) {
     FusedObject object = settle(trial.box, extents_[trial.extent].objects);
     if (!object.found.best.poses.empty()) found.push_back(std::move(object));
   }
@@ -230,7 +233,7 @@ double FusedRegion::complete(FusedObject first, const cv::Mat& foreground,
     int area = 0;
     const cv::Rect outline = largest_piece(pieces, area);
     if (area < least_remainder * whole || objects.size() == most_objects) return 1.0 - area / whole;
-    std::vector<FusedObject> next = candidates(outline);
+    std::vector<FusedObject> next = candidates(outline, 1.0 - most_overlapped);
     if (next.empty()) return 1.0 - area / whole;
     objects.push_back(std::move(next.front()));
   }
@@ -244,7 +247,8 @@ const std::vector<FusedObject>& FusedRegion::take_apart(const cv::Mat& cut, cons
   int area = 0;
   const cv::Rect outline = largest_piece(foreground, area);
   if (area == 0) return objects_;
-  const std::vector<FusedObject> first = candidates(outline);
+  // Of objects that overlap, one stands before the others and shows itself whole.
+  const std::vector<FusedObject> first = candidates(outline, 1.0);
   double most = 0.0;
   std::vector<FusedObject> objects;
   for (const FusedObject& begun : first) {

@@ -55,11 +55,12 @@ class FusedRegion {
   /// Makes the picture of a box of `work_`, and shows it to the recogniser. False where it is black.
   bool look(const cv::Rect& box, std::vector<float>& picture);
   /// Boxes in the corners of `outline`, most promising first.
-  std::vector<Trial> trials(const cv::Rect& outline);
+  /// @param visible share of an object's votes that it must get.
+  std::vector<Trial> trials(const cv::Rect& outline, double visible);
   /// The object in a box, its box set right by what alignment found.
   FusedObject settle(const cv::Rect& box, std::span<const std::size_t> shortlist);
   /// What may stand in a corner of `outline` and is sure enough, surest first.
-  std::vector<FusedObject> candidates(const cv::Rect& outline);
+  std::vector<FusedObject> candidates(const cv::Rect& outline, double visible);
   /// The foreground pixels that an object takes up.
   cv::Mat silhouette(const FusedObject& object) const;
   /// Follows one first object until nothing remains. Returns the share of the region that is explained.

@@ -93,10 +93,28 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
   return true;
 }
 
+RealignedDistance PartsStage::distance_of(std::span<const float> picture, const PartsAnswer& answer) {
+  return match_.distance(picture, answer.poses.front().misalignment, answer.object);
+}
+
+double PartsStage::likelihood(std::size_t object, double distance, double over) const {
+  const double typical = model_.parts->calibration[object].typical_distance;
+  const double variance = std::max(typical * typical / effective_dimensions, 1e-12);
+  return std::exp(-(distance * distance - over * over) / (2.0 * variance));
+}
+
 void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
-  const PartsIdentification found = recognizer_.identify();
-  const RealignedDistance distance =
-      match_.distance(picture, found.best.poses.front().misalignment, found.best.object);
+  PartsIdentification found = recognizer_.identify();
+  RealignedDistance distance = distance_of(picture, found.best);
+  if (found.tie && found.best.covered <= model_.parts->calibration[found.best.object].covered_share) {
+    // To their windows both are it; the whole regions, each aligned as it fits best, may tell them apart.
+    RealignedDistance second = distance_of(picture, *found.second);
+    if (second.own < distance.own) {
+      std::swap(found.best, *found.second);
+      std::swap(distance, second);
+    }
+    found.tie = 1.0 < sure_enough * (1.0 + likelihood(found.best.object, second.own, distance.own));
+  }
   describe(found, distance, accepted(found, distance), picture, outcome);
 }
 
@@ -106,9 +124,7 @@ std::span<const FusedObject> PartsStage::take_apart(const cv::Mat& cut, const Ba
 }
 
 void PartsStage::describe(const FusedObject& object, Outcome& outcome) {
-  const PartsAnswer& best = object.found.best;
-  describe(object.found, match_.distance(object.picture, best.poses.front().misalignment, best.object), true,
-           object.picture, outcome);
+  describe(object.found, distance_of(object.picture, object.found.best), true, object.picture, outcome);
 }
 
 void PartsStage::describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
@@ -122,9 +138,8 @@ void PartsStage::describe(const PartsIdentification& found, const RealignedDista
   finding.tie = found.tie;
   describe(finding, accepted, outcome);
   if (found.second) {
-    const PartsPose& pose = found.second->poses.front();
-    outcome.runner_up = {model_.objects[found.second->object].name, pose.q,
-                         match_.distance(picture, pose.misalignment, found.second->object).own};
+    outcome.runner_up = {model_.objects[found.second->object].name, found.second->poses.front().q,
+                         distance_of(picture, *found.second).own};
   }
 }
 
@@ -156,14 +171,11 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
     outcome.confidence =
         std::clamp((1.0 - finding.covered) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
   } else {
-    const double variance =
-        calibration.typical_distance * calibration.typical_distance / effective_dimensions;
-    const auto likelihood = [&](double distance) {
-      return std::exp(-(distance * distance - finding.distance.own * finding.distance.own) /
-                      (2.0 * std::max(variance, 1e-12)));
+    const auto beside = [&](double distance) {
+      return likelihood(finding.object, distance, finding.distance.own);
     };
-    const double second = finding.distance.other ? likelihood(finding.distance.other->distance) : 0.0;
-    outcome.confidence = 1.0 / (1.0 + second + likelihood(calibration.rejection_distance));
+    const double second = finding.distance.other ? beside(finding.distance.other->distance) : 0.0;
+    outcome.confidence = 1.0 / (1.0 + second + beside(calibration.rejection_distance));
   }
   for (const PartsPose& pose : finding.poses.subspan(1)) {
     if (pose.merit > best.merit - likely_pose && apart(finding.object, pose.q, best.q)) {

@@ -23,6 +23,8 @@ inline constexpr double poses_apart = 1.0 / 12.0;
 /// Numbers of a point that vary independently when a view is moved: the typical distance spreads over about
 /// so many. It turns distances into likelihoods.
 inline constexpr double effective_dimensions = 6.0;
+/// Below this probability of the best object or pose against the second best, the outcome is ambiguous.
+inline constexpr double sure_enough = 0.7;
 
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
@@ -56,6 +58,10 @@ class PartsStage {
   void describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
                 std::span<const float> picture, Outcome& outcome);
   void describe(const Finding& finding, bool accepted, Outcome& outcome) const;
+  /// Distance once a pose of the answer's object is undone, the best one.
+  RealignedDistance distance_of(std::span<const float> picture, const PartsAnswer& answer);
+  /// How likely a region of this object is at one distance over another.
+  [[nodiscard]] double likelihood(std::size_t object, double distance, double over) const;
   [[nodiscard]] bool accepted(const PartsIdentification& found, const RealignedDistance& distance) const;
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 

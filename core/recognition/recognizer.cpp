@@ -23,8 +23,6 @@ using SteadyTime = std::chrono::steady_clock;
 
 /// How far beyond the largest rejection distance the search looks for the runner-up.
 constexpr double search_reach = 1.5;
-/// Below this probability of the best against the second best, the outcome is ambiguous.
-constexpr double sure_enough = 0.7;
 /// Where the second best object is nearer than this times the best, the objects' own spaces decide.
 constexpr double second_look_ratio = 2.0;
 /// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.

@@ -55,9 +55,14 @@ void draw_object(cv::Mat& picture, int kind, double angle_deg, const SceneKnobs&
   std::sort(balls.begin(), balls.end(), [](const Ball& a, const Ball& b) { return a.z < b.z; });
   constexpr int fraction_bits = 4;
   constexpr double fraction = 1 << fraction_bits;
+  const cv::Point axis(static_cast<int>(std::lround(knobs.x * fraction)),
+                       static_cast<int>(std::lround(knobs.y * fraction)));
   for (const Ball& ball : balls) {
     const cv::Point middle(static_cast<int>(std::lround((knobs.x + knobs.scale * ball.x) * fraction)),
                            static_cast<int>(std::lround((knobs.y + knobs.scale * ball.y) * fraction)));
+    // A rod holds the ball, so that an object is one piece from all sides.
+    cv::line(picture, axis, middle, cv::Scalar::all(90.0 * knobs.brightness),
+             static_cast<int>(std::lround(std::max(2.0, 3.0 * knobs.scale))), cv::LINE_AA, fraction_bits);
     cv::Scalar color = ball.color * knobs.brightness;
     if (!knobs.color) color = cv::Scalar::all(0.114 * color[0] + 0.587 * color[1] + 0.299 * color[2]);
     cv::circle(picture, middle, static_cast<int>(std::lround(knobs.scale * ball.radius * fraction)), color,

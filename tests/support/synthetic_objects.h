@@ -1,7 +1,7 @@
 #pragma once
 
-/// Small made-up objects that turn before a camera: balls of different colour and size around an axis, drawn
-/// nearest last. Enough to learn and recognise in milliseconds, with a knob for every nuisance.
+/// Small made-up objects that turn before a camera: balls of different colour and size on rods around an
+/// axis, drawn nearest last. Enough to learn and recognise in milliseconds, with a knob for every nuisance.
 
 #include <filesystem>
 #include <string>

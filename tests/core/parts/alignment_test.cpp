@@ -69,9 +69,11 @@ TEST(PoseAligner, IsNotMisledByShiftAndScale) {
 TEST(DenseKernels, AgreeWithPlainSums) {
   const Eigen::MatrixXf matrix = Eigen::MatrixXf::Random(77, 5);
   const Eigen::MatrixXf vectors = Eigen::MatrixXf::Random(77, 6);
-  Eigen::MatrixXf out(5, 6);
-  multiply_transposed_six(matrix.data(), 77, 5, vectors.data(), out.data());
-  EXPECT_LT((out - matrix.transpose() * vectors).norm(), 1e-4F);
+  Eigen::MatrixXf out = Eigen::MatrixXf::Constant(7, 6, 3.0F);
+  multiply_transposed_six(matrix.data(), 77, 5, vectors.data(), out.data(), 7);
+  EXPECT_LT((out.topRows(5) - matrix.transpose() * vectors).norm(), 1e-4F);
+  EXPECT_EQ(out.bottomRows(2).minCoeff(), 3.0F) << "what lies between the columns is left alone";
+  EXPECT_EQ(out.bottomRows(2).maxCoeff(), 3.0F);
   float squared = 0.0F;
   float products[5];
   residual_products(matrix.data(), vectors.data(), 77, squared, products);

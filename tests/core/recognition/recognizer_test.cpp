@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <gmock/gmock.h>
+#include <opencv2/imgproc.hpp>
 
 #include "core/base/angle.h"
 #include "tests/support/learned_world.h"
@@ -114,6 +115,38 @@ TEST(Recognizer, SaysAmbiguousBetweenTwoObjectsThatLookAlike) {
   EXPECT_EQ(outcomes[0].verdict, Verdict::ambiguous);
   ASSERT_TRUE(outcomes[0].runner_up.has_value());
   EXPECT_NE(outcomes[0].runner_up->object, outcomes[0].best->object);
+}
+
+TEST(Recognizer, TellsTwinsApartThatLookAlikeToTheirWindows) {
+  // The second wears a faint mark, too little for votes of windows.
+  const auto scene = [](bool marked, double angle, int seed) {
+    cv::Mat picture = testing::scene_with(1, angle, {}, seed);
+    if (marked) cv::circle(picture, {80, 60}, 4, cv::Scalar(40, 40, 200), cv::FILLED, cv::LINE_AA);
+    return picture;
+  };
+  const test::TemporaryFolder folder;
+  for (const bool marked : {false, true}) {
+    ImageSetWriter writer(folder.path(), marked ? "marked" : "plain", turntable_workspace(),
+                          {{"from", "a test"}}, {.sync_every_view = false});
+    for (int v = 0; v < 36; ++v) writer.add(scene(marked, 10.0 * v, v), {10.0 * v});
+    writer.finish();
+  }
+  const auto sets = open_image_sets(folder.path());
+  LearningOptions options = testing::small_learning();
+  options.normalization.size = 64;
+  options.parts = true;
+  Recognizer recognize(std::make_shared<const Model>(learn(all_views(sets), options)));
+  int told = 0;
+  for (int i = 0; i < 24; ++i) {
+    const bool marked = i % 2 == 1;
+    const auto outcomes = recognize.recognize(scene(marked, 15.0 * i + 4.0, 100 + i));
+    ASSERT_EQ(outcomes.size(), 1U);
+    ASSERT_NE(outcomes[0].verdict, Verdict::unknown) << i;
+    if (outcomes[0].verdict != Verdict::recognized) continue;
+    EXPECT_EQ(outcomes[0].best->object, marked ? "marked" : "plain") << i;
+    ++told;
+  }
+  EXPECT_GE(told, 22);
 }
 
 TEST(Recognizer, DoesNotGuessAtHalfAnObjectOrASpeck) {

@@ -1,4 +1,4 @@
-#include "core/image/resize_kernels.h"
+#include "core/image/normalization_kernels.h"
 
 #include <algorithm>
 
@@ -30,7 +30,30 @@ constexpr std::size_t block = 24;
   for (std::size_t i = 0; i < count; ++i) out[i] += weight * in[i];
 }
 
+[[gnu::always_inline]] inline float largest_body(const float* in, std::size_t count) {
+  constexpr std::size_t lanes = 16;
+  float most[lanes] = {};
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes)
+    for (std::size_t j = 0; j < lanes; ++j) most[j] = in[i + j] > most[j] ? in[i + j] : most[j];
+  float result = *std::max_element(most, most + lanes);
+  for (; i < count; ++i) result = std::max(result, in[i]);
+  return result;
+}
+
+[[gnu::always_inline]] inline void round_body(const float* __restrict in, float gain, std::size_t count,
+                                              std::uint8_t* __restrict bytes) {
+  for (std::size_t i = 0; i < count; ++i)
+    bytes[i] = static_cast<std::uint8_t>(static_cast<int>(in[i] * gain + 0.5F));
+}
+
 #if defined(__x86_64__)
+[[gnu::target("avx2,fma")]] float largest_avx2(const float* in, std::size_t count) {
+  return largest_body(in, count);
+}
+[[gnu::target("avx2")]] void round_avx2(const float* in, float gain, std::size_t count, std::uint8_t* bytes) {
+  round_body(in, gain, count, bytes);
+}
 [[gnu::target("avx2,fma")]] void subtract_avx2(const std::uint8_t* bytes, std::size_t count, int level,
                                                float* out) {
   subtract_body(bytes, count, level, out);
@@ -76,6 +99,20 @@ void add_weighted(const float* in, float weight, std::size_t count, float* out) 
   }
 #endif
   add_body(in, weight, count, out);
+}
+
+float largest_of(const float* in, std::size_t count) {
+#if defined(__x86_64__)
+  if (has_avx2()) return largest_avx2(in, count);
+#endif
+  return largest_body(in, count);
+}
+
+void round_scaled(const float* in, float gain, std::size_t count, std::uint8_t* bytes) {
+#if defined(__x86_64__)
+  if (has_avx2()) return round_avx2(in, gain, count, bytes);
+#endif
+  round_body(in, gain, count, bytes);
 }
 
 }  // namespace eigenpose
