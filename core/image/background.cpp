@@ -9,7 +9,7 @@ namespace {
 
 using Histogram = std::array<int, 256>;
 
-constexpr int samples_wanted = 10000;
+constexpr int samples_wanted = 4000;
 
 /// Rows apart and columns apart, so that about `samples_wanted` pixels are looked at. Odd, so that periodic
 /// patterns do not fall into step.

@@ -18,6 +18,41 @@ float luma(float blue, float green, float red) {
 /// A pixel of range counts as measured when this share of its area was.
 constexpr float least_measured = 0.5F;
 
+/// Of colour pixels: out[3j…] = Σ weights[j·taps + s] · pixel first[j] + s, j < count. Four numbers at once:
+/// a pixel and the first of the next, which is overwritten by the next; one more than is wanted is read and
+/// written at the end. `Taps` is `taps`, or 0 for any.
+template <int Taps>
+void sum_colors(const float* source, const int* first, const float* weights, int taps, std::size_t count,
+                float* out) {
+  using Four [[gnu::vector_size(16), gnu::aligned(4)]] = float;
+  const int n = Taps > 0 ? Taps : taps;
+  for (std::size_t j = 0; j < count; ++j, weights += n) {
+    const float* pixels = source + std::ptrdiff_t{3} * first[j];
+    Four sum = weights[0] * *reinterpret_cast<const Four*>(pixels);
+    for (int s = 1; s < n; ++s) sum += weights[s] * *reinterpret_cast<const Four*>(pixels + 3 * s);
+    *reinterpret_cast<Four*>(out + 3 * j) = sum;
+  }
+}
+
+using SumColors = void (*)(const float*, const int*, const float*, int, std::size_t, float*);
+
+SumColors sum_colors_with(int taps) {
+  switch (taps) {
+    case 2:
+      return sum_colors<2>;
+    case 3:
+      return sum_colors<3>;
+    case 4:
+      return sum_colors<4>;
+    case 5:
+      return sum_colors<5>;
+    case 6:
+      return sum_colors<6>;
+    default:
+      return sum_colors<0>;
+  }
+}
+
 }  // namespace
 
 void set_image_type(NormalizationOptions& options, const std::string& type) {
@@ -71,46 +106,51 @@ void Normalizer::prepare(Axis& axis, int extent, int square) const {
   const double scale = static_cast<double>(square) / n;  // source pixels an output pixel
   const double width = std::max(1.0, scale);             // never narrower than a source pixel
   const double origin = 0.5 * (extent - square);         // left edge of the square, from the cut's edge
-  axis.taps.resize(static_cast<std::size_t>(n));
-  axis.weights.clear();
+  axis.taps = std::min(extent, static_cast<int>(std::ceil(width)) + 1);
+  axis.first.resize(static_cast<std::size_t>(n));
+  axis.weights.resize(static_cast<std::size_t>(n) * static_cast<std::size_t>(axis.taps));
+  float* weight = axis.weights.data();
+  const double share = 1.0 / width;
   for (int i = 0; i < n; ++i) {
     const double middle = origin + (i + 0.5) * scale;
     const double low = middle - 0.5 * width;
     const double high = middle + 0.5 * width;
-    const int first = std::max(0, static_cast<int>(std::floor(low)));
-    const int last = std::min(extent, static_cast<int>(std::ceil(high)));
-    Tap tap{first, std::max(0, last - first), axis.weights.size()};
-    for (int s = first; s < last; ++s) {
+    const int first = std::clamp(static_cast<int>(std::floor(low)), 0, extent - axis.taps);
+    axis.first[static_cast<std::size_t>(i)] = first;
+    for (int s = first; s < first + axis.taps; ++s) {
       const double covered = std::min<double>(high, s + 1) - std::max<double>(low, s);
-      axis.weights.push_back(static_cast<float>(std::max(0.0, covered) / width));
+      *weight++ = static_cast<float>(std::max(0.0, covered) * share);
     }
-    axis.taps[static_cast<std::size_t>(i)] = tap;
   }
 }
 
-const float* Normalizer::row(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, int y) {
+void Normalizer::add_row(const cv::Mat& cut, int y, float weight) {
   const auto width = static_cast<std::size_t>(cut.cols);
-  if (cut.type() == CV_16UC1) {
-    const auto* pixels = cut.ptr<std::uint16_t>(y);
-    const float base = 256.0F * level[0];
-    if (range_) {
-      for (std::size_t x = 0; x < width; ++x) {
-        converted_[2 * x] = std::max(0.0F, static_cast<float>(pixels[x]) - base);
-        converted_[2 * x + 1] = pixels[x] > 0 ? 1.0F : 0.0F;
-      }
-      return converted_.data();
+  if (cut.type() != CV_16UC1) {
+    const auto* pixels = cut.ptr<std::uint8_t>(y);
+    const int bands = cut.channels();
+    const std::size_t numbers = width * static_cast<std::size_t>(bands);
+    if (bands == 1 || options_.color) {
+      add_above_levels(pixels, numbers, levels_.data(), weight, sums_.data());
+      return;
     }
+    std::fill_n(converted_.begin(), numbers, 0.0F);
+    add_above_levels(pixels, numbers, levels_.data(), weight, converted_.data());
     for (std::size_t x = 0; x < width; ++x)
-      converted_[x] = std::max(0.0F, static_cast<float>(pixels[x]) - base) / 256.0F;
-    return converted_.data();
+      sums_[x] += luma(converted_[3 * x], converted_[3 * x + 1], converted_[3 * x + 2]);
+    return;
   }
-  const auto* pixels = cut.ptr<std::uint8_t>(y);
-  const int bands = cut.channels();
-  subtract_level(pixels, width * static_cast<std::size_t>(bands), level.data(), bands, converted_.data());
-  if (bands == 3 && !options_.color)
-    for (std::size_t x = 0; x < width; ++x)
-      converted_[x] = luma(converted_[3 * x], converted_[3 * x + 1], converted_[3 * x + 2]);
-  return converted_.data();
+  const auto* pixels = cut.ptr<std::uint16_t>(y);
+  const float base = 256.0F * levels_[0];
+  for (std::size_t x = 0; x < width; ++x) {
+    const float above = std::max(0.0F, static_cast<float>(pixels[x]) - base);
+    if (range_) {
+      sums_[2 * x] += weight * above;
+      sums_[2 * x + 1] += pixels[x] > 0 ? weight : 0.0F;
+    } else {
+      sums_[x] += weight * above / 256.0F;
+    }
+  }
 }
 
 float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level,
@@ -130,66 +170,46 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
   const auto bands = range_ ? std::size_t{2} : static_cast<std::size_t>(picture_bands(options_));
   const auto width = static_cast<std::size_t>(cut.cols) * bands;
   const int square = std::max(cut.rows, cut.cols);
+  levels_.resize(level_block);
+  for (std::size_t i = 0; i < level_block; ++i) levels_[i] = level[cut.channels() == 3 ? i % 3 : 0];
   prepare(vertical_, cut.rows, square);
   prepare(horizontal_, cut.cols, square);
   converted_.resize(std::max(converted_.size(), static_cast<std::size_t>(cut.cols) * 3));
-  sums_.assign(n * width, 0.0F);
-
-  // Vertically: each source row goes into the output rows it overlaps, first and last of which only move
-  // down.
-  std::size_t first_row = 0;
-  for (int y = 0; y < cut.rows; ++y) {
-    const float* source = row(cut, level, y);
-    while (first_row < n && vertical_.taps[first_row].first + vertical_.taps[first_row].count <= y)
-      ++first_row;
-    for (std::size_t i = first_row; i < n && vertical_.taps[i].first <= y; ++i) {
-      const Tap& tap = vertical_.taps[i];
-      const float weight = vertical_.weights[tap.weight + static_cast<std::size_t>(y - tap.first)];
-      add_weighted(source, weight, width, sums_.data() + i * width);
-    }
-  }
-
-  // Horizontally: short weighted sums.
+  // Each row of the result: the source rows it overlaps, summed, then the same within the row.
+  const auto taps = static_cast<std::size_t>(horizontal_.taps);
+  // Colour pixels beyond which the cut goes on for one more, so that nothing beyond it is read.
+  std::size_t inner = 0;
+  while (bands == 3 && inner + 1 < n && horizontal_.first[inner] + horizontal_.taps < horizontal_.extent)
+    ++inner;
+  const SumColors sum_inner = sum_colors_with(horizontal_.taps);
   const auto sum_row = [&](const float* source, float* out) {
-    std::size_t j = 0;
-    if (bands == 3) {
-      // Four numbers at once: a pixel and the first of the next, which is overwritten by the next. The last
-      // pixels of a row are left to the plain loop, so that nothing beyond it is read.
-      using Four [[gnu::vector_size(16), gnu::aligned(4)]] = float;
-      const int end = horizontal_.extent;
-      for (; j + 1 < n && horizontal_.taps[j].first + horizontal_.taps[j].count < end; ++j) {
-        const Tap& tap = horizontal_.taps[j];
-        const float* weights = horizontal_.weights.data() + tap.weight;
-        const float* pixels = source + static_cast<std::ptrdiff_t>(tap.first) * 3;
-        Four sum{};
-        for (int s = 0; s < tap.count; ++s)
-          sum += weights[s] * *reinterpret_cast<const Four*>(pixels + 3 * s);
-        *reinterpret_cast<Four*>(out + 3 * j) = sum;
-      }
-    }
+    sum_inner(source, horizontal_.first.data(), horizontal_.weights.data(), horizontal_.taps, inner, out);
+    std::size_t j = inner;
     for (; j < n; ++j) {
-      const Tap& tap = horizontal_.taps[j];
-      const float* weights = horizontal_.weights.data() + tap.weight;
-      const float* pixels = source + static_cast<std::size_t>(tap.first) * bands;
+      const float* weights = horizontal_.weights.data() + j * taps;
+      const float* pixels = source + static_cast<std::size_t>(horizontal_.first[j]) * bands;
       for (std::size_t b = 0; b < bands; ++b) {
         float sum = 0.0F;
-        for (int s = 0; s < tap.count; ++s)
-          sum += weights[s] * pixels[static_cast<std::size_t>(s) * bands + b];
+        for (std::size_t s = 0; s < taps; ++s) sum += weights[s] * pixels[s * bands + b];
         out[j * bands + b] = sum;
       }
     }
   };
   if (range_) depths_.resize(n * n * bands);
   float* out = range_ ? depths_.data() : picture.data();
-  for (std::size_t i = 0; i < n; ++i) sum_row(sums_.data() + i * width, out + i * n * bands);
+  const float* weight = vertical_.weights.data();
+  for (std::size_t i = 0; i < n; ++i) {
+    sums_.assign(width, 0.0F);
+    for (int s = 0; s < vertical_.taps; ++s, ++weight)
+      if (*weight > 0.0F) add_row(cut, vertical_.first[i] + s, *weight);
+    sum_row(sums_.data(), out + i * n * bands);
+  }
   if (range_)
     for (std::size_t i = 0; i < n * n; ++i) {
       const float measured = depths_[2 * i + 1];
       picture[i] = measured >= least_measured ? depths_[2 * i] / measured : 0.0F;
     }
-  double energy = 0.0;
-  for (const float value : picture) energy += static_cast<double>(value) * value;
-  return static_cast<float>(std::sqrt(energy));
+  return std::sqrt(energy_of(picture.data(), picture.size()));
 }
 
 void shrink_appearance(std::span<const float> appearance, int size, int bands, int side,

@@ -79,32 +79,29 @@ class Normalizer {
   float normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, std::span<float> picture);
 
  private:
-  /// A weighted range of source pixels for one output pixel.
-  struct Tap {
-    int first = 0;
-    int count = 0;
-    std::size_t weight = 0;  ///< index of the first weight
-  };
-  /// Taps of one axis: `extent` source pixels, centred in `square`.
+  /// One axis: `extent` source pixels, centred in `square`. Every output pixel is a weighted sum of `taps`
+  /// neighbouring source pixels: of as many for all, which keeps the loops over them short and even.
   struct Axis {
-    std::vector<Tap> taps;
-    std::vector<float> weights;
+    int taps = 0;
+    std::vector<int> first;      ///< source pixel, one an output pixel
+    std::vector<float> weights;  ///< `taps` an output pixel
     int extent = -1;
     int square = -1;
   };
 
   void prepare(Axis& axis, int extent, int square) const;
-  /// Row y of the cut, converted to the picture's bands as floats above the background; of range: depth where
+  /// Adds row y of the cut to `sums_`, in the picture's bands and above the background; of range: depth where
   /// measured, and 1 where measured.
-  const float* row(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, int y);
+  void add_row(const cv::Mat& cut, int y, float weight);
 
   NormalizationOptions options_;
   bool range_ = false;
   Axis vertical_;
   Axis horizontal_;
-  std::vector<float> converted_;  ///< one source row
-  std::vector<float> sums_;       ///< N rows of width × bands: the cut, averaged vertically
-  std::vector<float> depths_;     ///< of range: N × N pixels of depth and share measured
+  std::vector<std::uint8_t> levels_;  ///< of the background, over and over
+  std::vector<float> converted_;      ///< one source row of three bands, where one is made of it
+  std::vector<float> sums_;           ///< width × bands: source rows averaged vertically
+  std::vector<float> depths_;         ///< of range: N × N pixels of depth and share measured
 };
 
 /// An appearance of size×size pixels averaged down to side×side; exact area means. @pre side ≤ size.

@@ -6,28 +6,32 @@ namespace eigenpose {
 namespace {
 
 // One body, compiled once for every instruction set. This file is compiled with loop vectorisation on.
-[[gnu::always_inline]] inline void subtract_body(const std::uint8_t* bytes, std::size_t count, int level,
-                                                 float* out) {
-  for (std::size_t i = 0; i < count; ++i) out[i] = static_cast<float>(std::max(0, bytes[i] - level));
-}
-
-/// The levels repeat every three numbers; a block of 24 holds whole pixels and whole vectors.
-constexpr std::size_t block = 24;
-
-[[gnu::always_inline]] inline void subtract_three_body(const std::uint8_t* bytes, std::size_t count,
-                                                       const std::uint8_t* level, float* out) {
-  int levels[block];
-  for (std::size_t i = 0; i < block; ++i) levels[i] = level[i % 3];
+[[gnu::always_inline]] inline void add_above_body(const std::uint8_t* __restrict bytes, std::size_t count,
+                                                  const std::uint8_t* __restrict levels, float weight,
+                                                  float* __restrict out) {
+  std::uint8_t above[level_block];
   std::size_t i = 0;
-  for (; i + block <= count; i += block)
-    for (std::size_t j = 0; j < block; ++j)
-      out[i + j] = static_cast<float>(std::max(0, bytes[i + j] - levels[j]));
-  for (; i < count; ++i) out[i] = static_cast<float>(std::max(0, bytes[i] - levels[i % block]));
+  for (; i + level_block <= count; i += level_block) {
+    for (std::size_t j = 0; j < level_block; ++j) {
+      const std::uint8_t byte = bytes[i + j];
+      above[j] = static_cast<std::uint8_t>((byte > levels[j] ? byte : levels[j]) - levels[j]);
+    }
+    for (std::size_t j = 0; j < level_block; ++j) out[i + j] += weight * static_cast<float>(above[j]);
+  }
+  for (; i < count; ++i)
+    out[i] += weight * static_cast<float>(std::max(0, bytes[i] - levels[i % level_block]));
 }
 
-[[gnu::always_inline]] inline void add_body(const float* __restrict in, float weight, std::size_t count,
-                                            float* __restrict out) {
-  for (std::size_t i = 0; i < count; ++i) out[i] += weight * in[i];
+[[gnu::always_inline]] inline float energy_body(const float* in, std::size_t count) {
+  constexpr std::size_t lanes = 32;
+  float sums[lanes] = {};
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes)
+    for (std::size_t j = 0; j < lanes; ++j) sums[j] += in[i + j] * in[i + j];
+  double result = 0.0;
+  for (const float sum : sums) result += sum;
+  for (; i < count; ++i) result += static_cast<double>(in[i]) * in[i];
+  return static_cast<float>(result);
 }
 
 [[gnu::always_inline]] inline float largest_body(const float* in, std::size_t count) {
@@ -43,8 +47,11 @@ constexpr std::size_t block = 24;
 
 [[gnu::always_inline]] inline void round_body(const float* __restrict in, float gain, std::size_t count,
                                               std::uint8_t* __restrict bytes) {
-  for (std::size_t i = 0; i < count; ++i)
-    bytes[i] = static_cast<std::uint8_t>(static_cast<int>(in[i] * gain + 0.5F));
+  constexpr float half = 0.5F;  // of numbers ≥ 0, and done for many at once
+  for (std::size_t i = 0; i < count; ++i) {
+    const float rounded = in[i] * gain + half;
+    bytes[i] = static_cast<std::uint8_t>(static_cast<int>(rounded));
+  }
 }
 
 #if defined(__x86_64__)
@@ -54,16 +61,12 @@ constexpr std::size_t block = 24;
 [[gnu::target("avx2")]] void round_avx2(const float* in, float gain, std::size_t count, std::uint8_t* bytes) {
   round_body(in, gain, count, bytes);
 }
-[[gnu::target("avx2,fma")]] void subtract_avx2(const std::uint8_t* bytes, std::size_t count, int level,
-                                               float* out) {
-  subtract_body(bytes, count, level, out);
+[[gnu::target("avx2,fma")]] float energy_avx2(const float* in, std::size_t count) {
+  return energy_body(in, count);
 }
-[[gnu::target("avx2,fma")]] void subtract_three_avx2(const std::uint8_t* bytes, std::size_t count,
-                                                     const std::uint8_t* level, float* out) {
-  subtract_three_body(bytes, count, level, out);
-}
-[[gnu::target("avx2,fma")]] void add_avx2(const float* in, float weight, std::size_t count, float* out) {
-  add_body(in, weight, count, out);
+[[gnu::target("avx2,fma")]] void add_above_avx2(const std::uint8_t* bytes, std::size_t count,
+                                                const std::uint8_t* levels, float weight, float* out) {
+  add_above_body(bytes, count, levels, weight, out);
 }
 bool has_avx2() {
   static const bool has = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
@@ -73,32 +76,22 @@ bool has_avx2() {
 
 }  // namespace
 
-void subtract_level(const std::uint8_t* bytes, std::size_t count, const std::uint8_t* level, int period,
-                    float* out) {
-  const bool same = period == 1 || (level[0] == level[1] && level[1] == level[2]);
+void add_above_levels(const std::uint8_t* bytes, std::size_t count, const std::uint8_t* levels, float weight,
+                      float* out) {
 #if defined(__x86_64__)
   if (has_avx2()) {
-    if (same)
-      subtract_avx2(bytes, count, level[0], out);
-    else
-      subtract_three_avx2(bytes, count, level, out);
+    add_above_avx2(bytes, count, levels, weight, out);
     return;
   }
 #endif
-  if (same)
-    subtract_body(bytes, count, level[0], out);
-  else
-    subtract_three_body(bytes, count, level, out);
+  add_above_body(bytes, count, levels, weight, out);
 }
 
-void add_weighted(const float* in, float weight, std::size_t count, float* out) {
+float energy_of(const float* in, std::size_t count) {
 #if defined(__x86_64__)
-  if (has_avx2()) {
-    add_avx2(in, weight, count, out);
-    return;
-  }
+  if (has_avx2()) return energy_avx2(in, count);
 #endif
-  add_body(in, weight, count, out);
+  return energy_body(in, count);
 }
 
 float largest_of(const float* in, std::size_t count) {

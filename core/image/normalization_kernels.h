@@ -8,12 +8,15 @@
 
 namespace eigenpose {
 
-/// out[i] = max(0, bytes[i] − level[i mod period]), i < count. `period` is 1 or 3.
-void subtract_level(const std::uint8_t* bytes, std::size_t count, const std::uint8_t* level, int period,
-                    float* out);
+/// Levels stand this often one after the other: whole pixels of one or three bands, and whole vectors.
+inline constexpr std::size_t level_block = 96;
 
-/// out[i] += weight · in[i], i < count.
-void add_weighted(const float* in, float weight, std::size_t count, float* out);
+/// out[i] += weight · max(0, bytes[i] − levels[i mod level_block]), i < count.
+void add_above_levels(const std::uint8_t* bytes, std::size_t count, const std::uint8_t* levels, float weight,
+                      float* out);
+
+/// Sum of the squares of `count` numbers.
+float energy_of(const float* in, std::size_t count);
 
 /// The largest of `count` numbers ≥ 0; 0 of none.
 float largest_of(const float* in, std::size_t count);

@@ -112,13 +112,23 @@ class PlainPipeline {
   Eigen::MatrixXf samples_;
 };
 
+/// The camera stands as far from the table when objects are learned as when they are recognised.
+testing::SceneKnobs one_object() {
+  testing::SceneKnobs knobs;
+  knobs.width = 320;
+  knobs.height = 240;
+  knobs.x = 160.0;
+  knobs.y = 120.0;
+  knobs.scale = 3.2;
+  return knobs;
+}
+
 std::vector<cv::Mat> make_frames(int objects) {
   std::vector<cv::Mat> result;
   for (int i = 0; i < frames; ++i) {
-    testing::SceneKnobs knobs;
+    testing::SceneKnobs knobs = one_object();
     knobs.width = 640;
     knobs.height = 480;
-    knobs.scale = 3.2;
     cv::Mat frame = testing::empty_scene(knobs, i);
     const int count = 1 + i % 4;
     for (int c = 0; c < count; ++c) {
@@ -177,7 +187,8 @@ void measure(std::span<const ImageSet> sets, const std::vector<cv::Mat>& picture
 int run(int objects) {
   cv::setNumThreads(1);
   const test::TemporaryFolder folder;
-  for (int o = 0; o < objects; ++o) testing::write_turn(folder.path(), "obj" + std::to_string(o), o, views);
+  for (int o = 0; o < objects; ++o)
+    testing::write_turn(folder.path(), "obj" + std::to_string(o), o, views, one_object());
   const auto sets = open_image_sets(folder.path());
   const std::vector<cv::Mat> pictures = make_frames(objects);
   measure(sets, pictures, false);

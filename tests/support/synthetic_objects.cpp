@@ -62,7 +62,7 @@ void draw_object(cv::Mat& picture, int kind, double angle_deg, const SceneKnobs&
                            static_cast<int>(std::lround((knobs.y + knobs.scale * ball.y) * fraction)));
     // A rod holds the ball, so that an object is one piece from all sides.
     cv::line(picture, axis, middle, cv::Scalar::all(90.0 * knobs.brightness),
-             static_cast<int>(std::lround(std::max(2.0, 3.0 * knobs.scale))), cv::LINE_AA, fraction_bits);
+             static_cast<int>(std::lround(std::max(1.0, 3.0 * knobs.scale))), cv::LINE_AA, fraction_bits);
     cv::Scalar color = ball.color * knobs.brightness;
     if (!knobs.color) color = cv::Scalar::all(0.114 * color[0] + 0.587 * color[1] + 0.299 * color[2]);
     cv::circle(picture, middle, static_cast<int>(std::lround(knobs.scale * ball.radius * fraction)), color,
@@ -83,12 +83,17 @@ cv::Mat scene_with(int kind, double angle_deg, const SceneKnobs& knobs, int seed
   return picture;
 }
 
+void write_turn(const std::filesystem::path& root, const std::string& name, int views,
+                const std::function<cv::Mat(double, int)>& scene) {
+  ImageSetWriter writer(root, name, turntable_workspace(), {{"from", "a test"}}, {.sync_every_view = false});
+  for (int i = 0; i < views; ++i) writer.add(scene(360.0 * i / views, i), {360.0 * i / views});
+  writer.finish();
+}
+
 void write_turn(const std::filesystem::path& root, const std::string& name, int kind, int views,
                 const SceneKnobs& knobs) {
-  ImageSetWriter writer(root, name, turntable_workspace(), {{"from", "a test"}}, {.sync_every_view = false});
-  for (int i = 0; i < views; ++i)
-    writer.add(scene_with(kind, 360.0 * i / views, knobs, i), {360.0 * i / views});
-  writer.finish();
+  write_turn(root, name, views,
+             [&](double angle, int number) { return scene_with(kind, angle, knobs, number); });
 }
 
 }  // namespace eigenpose::testing

@@ -4,6 +4,7 @@
 /// axis, drawn nearest last. Enough to learn and recognise in milliseconds, with a knob for every nuisance.
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include <opencv2/core.hpp>
@@ -34,7 +35,10 @@ cv::Mat scene_with(int kind, double angle_deg, const SceneKnobs& knobs = {}, int
 /// Object number for one that looks the same from all sides.
 constexpr int symmetric_kind = -1;
 
-/// Writes an image set of `views` pictures evenly around a turn below `root`.
+/// Writes an image set of `views` pictures evenly around a turn below `root`; `scene` makes each of its angle
+/// in degrees and its number.
+void write_turn(const std::filesystem::path& root, const std::string& name, int views,
+                const std::function<cv::Mat(double, int)>& scene);
 void write_turn(const std::filesystem::path& root, const std::string& name, int kind, int views,
                 const SceneKnobs& knobs = {});
 
