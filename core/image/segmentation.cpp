@@ -235,9 +235,7 @@ bool Segmenter::Impl::erase_others(const cv::Rect& box, int label, cv::Mat* targ
       if (first >= last || find_root(components, runs[r].label) == label) continue;
       any = true;
       if (target == nullptr) return true;
-      const auto& level = background.level;
-      (*target)(cv::Rect(first - box.x, y - box.y, last - first, 1)) =
-          cv::Scalar(level[0], level[1], level[2]);
+      (*target)(cv::Rect(first - box.x, y - box.y, last - first, 1)) = background.color();
     }
   }
   return any;

@@ -35,6 +35,11 @@ struct Background {
   std::array<std::uint8_t, 3> level{};  ///< per band; a grey picture has one
   double noise = 0.0;                   ///< 1 sigma of the brightest band
   int threshold = 0;                    ///< a pixel is foreground when its brightest band is above
+
+  /// `level` as OpenCV takes colours.
+  [[nodiscard]] cv::Scalar color() const {
+    return {static_cast<double>(level[0]), static_cast<double>(level[1]), static_cast<double>(level[2])};
+  }
 };
 
 /// Finds regions. Holds scratch memory, and allocates nothing once it has seen a picture of the same size and

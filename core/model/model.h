@@ -60,6 +60,18 @@ struct Model {
   [[nodiscard]] double rejection_distance(std::size_t o) const {
     return parts ? parts->calibration[o].rejection_distance : objects[o].rejection_distance;
   }
+  /// Root mean square distance of new views of object `o` from its manifold, likewise.
+  [[nodiscard]] double typical_distance(std::size_t o) const {
+    return parts ? parts->calibration[o].typical_distance : objects[o].typical_distance;
+  }
+  /// Bytes held for object `o` alone: windows, pose space, own eigenspace.
+  [[nodiscard]] std::size_t memory(std::size_t o) const {
+    std::size_t bytes = parts ? parts->memory(o) : 0;
+    if (const auto& own = objects[o].space)
+      bytes += static_cast<std::size_t>(own->eigenspace.basis.size() + own->eigenspace.mean.size()) *
+               sizeof(float);
+    return bytes;
+  }
 };
 
 }  // namespace eigenpose

@@ -29,11 +29,6 @@ constexpr double most_left_over = 0.1;    ///< what is covered by more than this
 constexpr double final_slack = 1.5;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
 
-cv::Scalar level_of(const Background& background) {
-  return {static_cast<double>(background.level[0]), static_cast<double>(background.level[1]),
-          static_cast<double>(background.level[2])};
-}
-
 cv::Mat foreground_of(const cv::Mat& cut, const Background& background) {
   cv::Mat brightest;
   if (cut.channels() == 3) {
@@ -118,7 +113,7 @@ bool FusedRegion::possible(const cv::Size& region) const {
 
 bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
   crop_.create(box.size(), work_.type());
-  crop_.setTo(level_of(background_));
+  crop_.setTo(background_.color());
   const cv::Rect inside = box & cv::Rect(0, 0, work_.cols, work_.rows);
   if (inside.empty()) return false;
   work_(inside).copyTo(crop_(inside - box.tl()));
@@ -227,7 +222,7 @@ double FusedRegion::complete(FusedObject first, const cv::Mat& foreground,
   while (true) {
     const cv::Mat taken = silhouette(objects.back());
     rest.setTo(0, taken);
-    work_.setTo(level_of(background_), taken);
+    work_.setTo(background_.color(), taken);
     cv::Mat pieces;
     cv::morphologyEx(rest, pieces, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
     int area = 0;
@@ -268,7 +263,7 @@ const std::vector<FusedObject>& FusedRegion::take_apart(const cv::Mat& cut, cons
       if (k == i) continue;
       cv::Mat other = silhouette(objects_[k]);
       other.setTo(0, own);
-      work_.setTo(level_of(background_), other);
+      work_.setTo(background_.color(), other);
     }
     FusedObject again = settle(objects_[i].box, std::span(&objects_[i].found.best.object, 1));
     if (again.found.best.poses.empty()) continue;

@@ -47,6 +47,16 @@ void check_names(std::span<const TrainingSet> sets) {
       throw Error("two image sets are of the object \"" + set.object() + "\"; learn only one of them");
 }
 
+/// Poses of several DOFs take more dimensions than these: else their manifold fills the space, and whatever
+/// is shown lies on it.
+void check_dimensions(const ObjectViews& object, Eigen::Index dimensions) {
+  const auto dofs = static_cast<Eigen::Index>(object.workspace.size());
+  if (dofs < 2 || dimensions > dofs) return;
+  throw Error("an eigenspace of " + std::to_string(dimensions) + " dimensions cannot show poses of " +
+              std::to_string(dofs) + " degrees of freedom (" + object.object +
+              "); learn with more components, or from more views");
+}
+
 /// The pictures of a store, object by object, as partial matching learns them.
 std::vector<PartsViews> parts_views(const ViewStore& views) {
   std::vector<PartsViews> result;
@@ -102,6 +112,8 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   options.rejection.threads = options.threads;
   // Windows and alignment look at brightness.
   options.parts = options.parts && !is_range(options.normalization);
+  // A pose space is an object's own already, and windows are the second look.
+  options.object_spaces = options.object_spaces && !options.parts;
 
   const ViewStore views(sets, store_options(options), progress, stop);
   told.views = views.count();
@@ -125,6 +137,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   known = {};
   told.eigenspace_time = watch.lap();
 
+  for (const ObjectViews& object : views.objects()) check_dimensions(object, model.eigenspace.components());
   const Eigen::MatrixXd points = project_all(views, model.eigenspace, options.threads);
   std::vector<Manifold> manifolds;
   for (const ObjectViews& object : views.objects())

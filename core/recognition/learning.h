@@ -23,8 +23,8 @@ struct LearningOptions {
   SolverOptions solver;
   int spline_degree = 2;  ///< 1, 2 or 3
   RejectionOptions rejection;
-  /// Learn each object's own eigenspace too: for a second look where two objects are close, and for pose
-  /// where it is better.
+  /// Without parts, learn each object's own eigenspace too: for a second look where two objects are close,
+  /// and for pose where it is better.
   bool object_spaces = true;
   /// Learn windows and pose spaces too: matching that bears covers and misalignment. Without, only the whole
   /// region is matched. They look at brightness whatever the image type is; of range there are none.

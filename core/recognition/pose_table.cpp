@@ -129,6 +129,12 @@ std::optional<PoseTable::Fit> PoseTable::other_minimum(const Eigen::Ref<const Ei
   return best;
 }
 
+std::vector<double> PoseTable::pose(std::size_t sample) const {
+  std::vector<double> q;
+  for (const Axis& axis : axes_) q.push_back(value(sample, axis));
+  return q;
+}
+
 std::span<const double> PoseTable::sensitivity(std::span<const double> q) const {
   std::size_t sample = 0;
   for (std::size_t d = 0; d < axes_.size(); ++d) sample += nearest_index(axes_[d], q[d]) * axes_[d].stride;

@@ -37,6 +37,12 @@ class PoseTable {
   [[nodiscard]] std::span<const double> sensitivity(std::span<const double> q) const;
 
   [[nodiscard]] std::size_t dofs() const { return axes_.size(); }
+  [[nodiscard]] std::size_t samples() const { return static_cast<std::size_t>(points_.cols()); }
+  /// Pose of a sample, m numbers, and its point, K numbers.
+  [[nodiscard]] std::vector<double> pose(std::size_t sample) const;
+  [[nodiscard]] auto point(std::size_t sample) const {
+    return points_.col(static_cast<Eigen::Index>(sample));
+  }
 
  private:
   /// Sample positions along one DOF.

@@ -9,13 +9,14 @@
 
 #include "core/base/error.h"
 #include "core/image/coil_import.h"
+#include "core/image/turned_import.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 
 namespace eigenpose::cli {
 namespace {
 
-constexpr const char* import_examples = R"(
+constexpr const char* coil_examples = R"(
 The pictures are named OBJECT__NUMBER.png. Each object becomes an image set SETS/OBJECT.
   --angle index:5    the number counts pictures, 5 degrees apart (COIL-20)
   --angle degrees    the number is the angle (COIL-100)
@@ -27,12 +28,27 @@ Examples:
 Views that show the object from edge to edge are taken whole later on, others are segmented. Which it is, is measured
 over the whole folder and kept in each set.json; --views overrules it.)";
 
-struct ImportOptions {
-  std::string naming;
+constexpr const char* turned_examples = R"(
+Parts that lie flat under a camera look the same wherever they lie, but for how they are turned: one picture of each
+is enough. Every part in the picture becomes an image set, turned around once; its pose is by how many degrees it lies
+turned, counter-clockwise, from how it lies in the picture. What touches the picture's border is left out.
+
+Examples:
+  eigenpose import turned parts.png --to sets --names bracket,plate
+  eigenpose learn sets --to parts.model --grey
+  eigenpose recognize tray.png --model parts.model)";
+
+struct CoilOptions {
   std::string folder;
   std::string to;
   std::string angle;
   std::string views = "auto";
+};
+
+struct TurnedOptions {
+  std::string picture;
+  std::string to;
+  TurnedImportOptions import;
 };
 
 CoilAngle parse_angle(const std::string& text) {
@@ -49,7 +65,7 @@ CoilAngle parse_angle(const std::string& text) {
   throw ConfigError("--angle " + text + ": give index:5 (the number counts steps of 5 degrees) or degrees");
 }
 
-int run_import(const ImportOptions& options, const std::stop_token& stop) {
+int run_coil(const CoilOptions& options, const std::stop_token& stop) {
   CoilImportOptions import;
   import.angle = parse_angle(options.angle);
   if (options.views == "cropped") import.views = ViewKind::cropped;
@@ -66,15 +82,21 @@ int run_import(const ImportOptions& options, const std::stop_token& stop) {
   return exit_done;
 }
 
-}  // namespace
+int run_turned(const TurnedOptions& options, const std::stop_token& stop) {
+  ConsoleProgress progress;
+  const auto names = import_turned(options.picture, options.to, options.import, progress.callback(), stop);
+  progress.clear();
+  std::printf("%zu parts, %zu views each, into %s:", names.size(), options.import.views, options.to.c_str());
+  for (const std::string& name : names) std::printf(" %s", name.c_str());
+  std::printf("\n");
+  return exit_done;
+}
 
-void add_import_command(CLI::App& app, CommandLine& line) {
-  auto options = std::make_shared<ImportOptions>();
-  CLI::App* command = app.add_subcommand("import", "Turn photographs into image sets");
-  command->footer(import_examples);
-  command->add_option("naming", options->naming, "How the pictures are named: coil")
-      ->required()
-      ->check(CLI::IsMember({"coil"}));
+void add_coil(CLI::App& import, CommandLine& line) {
+  auto options = std::make_shared<CoilOptions>();
+  CLI::App* command =
+      import.add_subcommand("coil", "Pictures of turned objects, named as in COIL-20 and COIL-100");
+  command->footer(coil_examples);
   command->add_option("folder", options->folder, "Folder with the pictures")->required();
   command->add_option("--to", options->to, "Folder for the image sets")->required();
   command->add_option("--angle", options->angle, "What the number in a name means: index:STEP or degrees")
@@ -83,7 +105,31 @@ void add_import_command(CLI::App& app, CommandLine& line) {
       ->check(CLI::IsMember({"auto", "cropped", "scene"}))
       ->capture_default_str();
   command->callback(
-      [options, &line] { line.action = [options, &line] { return run_import(*options, line.stop); }; });
+      [options, &line] { line.action = [options, &line] { return run_coil(*options, line.stop); }; });
+}
+
+void add_turned(CLI::App& import, CommandLine& line) {
+  auto options = std::make_shared<TurnedOptions>();
+  CLI::App* command = import.add_subcommand("turned", "One picture of parts that lie flat under the camera");
+  command->footer(turned_examples);
+  command->add_option("picture", options->picture, "The picture")->required();
+  command->add_option("--to", options->to, "Folder for the image sets")->required();
+  command->add_option("--names", options->import.names, "Names of the parts, from left to right: a,b,c")
+      ->delimiter(',');
+  command->add_option("--count", options->import.views, "Views around a turn")
+      ->check(CLI::Range(2, 3600))
+      ->capture_default_str();
+  command->callback(
+      [options, &line] { line.action = [options, &line] { return run_turned(*options, line.stop); }; });
+}
+
+}  // namespace
+
+void add_import_command(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("import", "Turn photographs into image sets");
+  command->require_subcommand(1);
+  add_coil(*command, line);
+  add_turned(*command, line);
 }
 
 }  // namespace eigenpose::cli

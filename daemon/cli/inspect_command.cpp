@@ -10,6 +10,7 @@
 #include "core/model/model_file.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/geometry_report.h"
+#include "daemon/cli/resemblance_report.h"
 
 namespace eigenpose::cli {
 namespace {
@@ -48,7 +49,8 @@ json to_json(const Model& model) {
     objects.push_back({{"name", object.name},
                        {"views", object.views},
                        {"rejection_distance", model.rejection_distance(o)},
-                       {"typical_distance", object.typical_distance},
+                       {"typical_distance", model.typical_distance(o)},
+                       {"bytes", model.memory(o)},
                        {"pose_observable", object.pose_observable},
                        {"spline_degree", object.manifold.degree()},
                        {"workspace", axes}});
@@ -79,12 +81,13 @@ void print(const Model& model) {
               model.normalization.cropped ? "each picture taken whole" : "objects cut out of each picture");
   std::printf("space     %td dimensions by %s keep %.1f %% of the scatter\n", model.eigenspace.components(),
               model.provenance.solver.c_str(), 100.0 * model.provenance.energy);
-  std::printf("\n%-16s %6s %18s %9s  %s\n", "object", "views", "rejection distance", "typical",
+  std::printf("\n%-16s %6s %18s %9s %8s  %s\n", "object", "views", "rejection distance", "typical", "memory",
               "degrees of freedom");
   for (std::size_t o = 0; o < model.objects.size(); ++o) {
     const ModelObject& object = model.objects[o];
-    std::printf("%-16s %6zu %18.4f %9.4f  ", object.name.c_str(), object.views, model.rejection_distance(o),
-                object.typical_distance);
+    std::printf("%-16s %6zu %18.4f %9.4f %5.2f MB  ", object.name.c_str(), object.views,
+                model.rejection_distance(o), model.typical_distance(o),
+                static_cast<double>(model.memory(o)) / 1e6);
     for (std::size_t d = 0; d < object.workspace.size(); ++d) {
       const Dof& dof = object.workspace[d];
       std::printf("%s%s: %zu values in %g…%g %s%s%s", d > 0 ? "; " : "", dof.name.c_str(),
@@ -99,12 +102,14 @@ int run_inspect(const InspectOptions& options) {
   const Model model = load_model(options.model);
   if (options.as_json) {
     json all = to_json(model);
+    all["alike"] = resemblance_json(model);
     if (options.geometry)
       for (std::size_t o = 0; o < model.objects.size(); ++o)
         all["objects"][o]["geometry"] = geometry_json(model.objects[o]);
     std::printf("%s\n", all.dump(2).c_str());
   } else {
     print(model);
+    print_resemblance(model);
     if (options.geometry) print_geometry(model);
   }
   return exit_done;

@@ -16,6 +16,7 @@
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 #include "daemon/cli/learning_options.h"
+#include "daemon/cli/resemblance_report.h"
 #include "daemon/cli/service_client.h"
 
 namespace eigenpose::cli {
@@ -82,6 +83,7 @@ void print(const Model& model, const LearningReport& report, const std::string& 
       "learned %zu objects from %zu views in %.1f s: %zu dimensions by %s keep %.1f %% of the scatter\n",
       model.objects.size(), report.views, seconds(report.total_time), report.solver.components,
       report.solver.solver.c_str(), 100.0 * report.solver.energy);
+  print_resemblance(model);
   std::printf("model: %s\n", file.c_str());
 }
 

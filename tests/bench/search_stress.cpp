@@ -47,7 +47,8 @@ std::vector<Manifold> random_list(std::size_t dofs, std::mt19937& random) {
   const auto number = [&](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(random);
   };
-  const Eigen::Index dimensions = number(2, 24);
+  // As learning demands it: fewer dimensions than that, and manifolds fill their space.
+  const Eigen::Index dimensions = number(static_cast<int>(dofs) + 1, 24);
   const int most = dofs == 1 ? 16 : dofs == 2 ? 10 : dofs == 3 ? 6 : 4;
   std::vector<Manifold> list;
   for (int i = number(2, dofs > 2 ? 3 : 5); i > 0; --i) {
