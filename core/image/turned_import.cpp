@@ -28,7 +28,7 @@ cv::Mat in_a_square(const cv::Mat& cut, const Background& background) {
 
 std::vector<std::string> import_turned(const std::filesystem::path& picture,
                                        const std::filesystem::path& root, const TurnedImportOptions& options,
-                                       const Progress& progress, std::stop_token stop) {
+                                       const Progress& progress, const std::stop_token& stop) {
   if (options.views < 2 || options.views > 3600)
     throw std::invalid_argument("a turn of " + std::to_string(options.views) +
                                 " views: allowed are 2 to 3600");

@@ -29,6 +29,6 @@ struct TurnedImportOptions {
 /// Interrupted.
 std::vector<std::string> import_turned(const std::filesystem::path& picture,
                                        const std::filesystem::path& root, const TurnedImportOptions& options,
-                                       const Progress& progress = {}, std::stop_token stop = {});
+                                       const Progress& progress = {}, const std::stop_token& stop = {});
 
 }  // namespace eigenpose

@@ -105,7 +105,7 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
     for (std::size_t o = 0; o < learning.match.size(); ++o) {
       PartsCalibration& own = parts->calibration[o];
       own.rejection_distance = thresholds.rejection_distance[o];
-      own.sure_distance = std::min(own.sure_distance, own.rejection_distance);
+      own.sure_distance = thresholds.sure_distance[o];
     }
     parts->objects.erase(parts->objects.begin() + at);
     parts->poses.erase(parts->poses.begin() + at);

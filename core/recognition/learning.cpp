@@ -14,9 +14,6 @@
 namespace eigenpose {
 namespace {
 
-/// A distance of so many scales of its object leaves no doubt; beyond, windows must agree.
-constexpr double sure_scales = 1.5;
-
 std::string utc_now() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm parts{};
@@ -184,8 +181,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     parts->smallest_rate = match.smallest_rate;
     for (std::size_t o = 0; o < told.match.size(); ++o) {
       parts->calibration[o].rejection_distance = match.rejection_distance[o];
-      parts->calibration[o].sure_distance =
-          std::min(match.rejection_distance[o], sure_scales * told.match[o].scale);
+      parts->calibration[o].sure_distance = match.sure_distance[o];
       parts->calibration[o].typical_distance = told.match[o].typical_distance;
     }
     CoveredCalibrationOptions covered_options;

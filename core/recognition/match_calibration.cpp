@@ -19,6 +19,9 @@
 namespace eigenpose {
 namespace {
 
+/// A distance of so many scales of its object leaves no doubt; beyond, windows must agree.
+constexpr double sure_scales = 1.5;
+
 /// Error² of a spline grows by this much when the step doubles, where it can't be measured; and the bounds
 /// within which a measured growth is believed: the first power of the step, and the third.
 constexpr double default_growth = 4.0;
@@ -258,7 +261,10 @@ MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
   const double cap = others[std::min(nearest, others.size() - 1)];
   for (std::size_t o = 0; o < evidence.size(); ++o) {
     const double scale = evidence[o].scale;
-    result.rejection_distance.push_back(o == without ? 0.0 : std::max(std::min(limit * scale, cap), scale));
+    const double rejection = o == without ? 0.0 : std::max(std::min(limit * scale, cap), scale);
+    result.rejection_distance.push_back(rejection);
+    // As near as strangers come, windows are asked, however far known views may be.
+    result.sure_distance.push_back(std::min({rejection, sure_scales * scale, cap}));
   }
   return result;
 }

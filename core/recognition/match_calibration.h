@@ -43,6 +43,7 @@ struct MatchEvidence {
 /// Thresholds of a model.
 struct MatchThresholds {
   std::vector<double> rejection_distance;  ///< one an object; 0 for the one left out
+  std::vector<double> sure_distance;       ///< likewise; see PartsCalibration
   double sure_ratio = 0.0;                 ///< see PartsModel
   double smallest_rate = 1.0;              ///< 1/(n + 1)
 };

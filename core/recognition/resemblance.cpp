@@ -44,6 +44,7 @@ std::vector<Resemblance> seen_from(const Model& model, const ManifoldSearch& sea
     }
   }
   std::vector<Resemblance> found;
+  found.reserve(by_other.size());
   for (auto& [other, pair] : by_other) found.push_back(std::move(pair));
   return found;
 }
@@ -70,6 +71,7 @@ std::vector<Resemblance> alike_objects(const Model& model, unsigned threads) {
       at->second.share = share;
     }
   std::vector<Resemblance> found;
+  found.reserve(pairs.size());
   for (auto& [objects, pair] : pairs) found.push_back(std::move(pair));
   sort_by_distance(found);
   return found;
