@@ -26,7 +26,7 @@ nlohmann::json to_json(const Model& model, const std::vector<Resemblance>& all) 
   return list;
 }
 
-std::string place(const ModelObject& object, const std::vector<double>& q) {
+std::string pose_text(const ModelObject& object, const std::vector<double>& q) {
   std::string text;
   for (std::size_t d = 0; d < q.size(); ++d)
     text += fmt::format("{}{:.0f} {}", d > 0 ? ", " : "", q[d], object.workspace[d].unit);
@@ -42,8 +42,9 @@ void print(const Model& model, const std::vector<Resemblance>& all, const char* 
     const ModelObject& second = model.objects[one.second];
     std::printf(
         "  %-34s %-34s distance %.4f, %.0f %% of the poses\n",
-        (first.name + " at " + place(first, one.first_q)).c_str(),
-        ((one.first == one.second ? "itself" : second.name) + " at " + place(second, one.second_q)).c_str(),
+        (first.name + " at " + pose_text(first, one.first_q)).c_str(),
+        ((one.first == one.second ? "itself" : second.name) + " at " + pose_text(second, one.second_q))
+            .c_str(),
         one.distance, 100.0 * one.share);
   }
   if (all.size() > most_lines)
