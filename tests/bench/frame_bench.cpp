@@ -17,45 +17,22 @@
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
-#include <time.h>
 
 #include "core/recognition/learning.h"
 #include "core/recognition/recognizer.h"
+#include "tests/bench/series.h"
 #include "tests/support/synthetic_objects.h"
 #include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
 
+using bench::Series;
+using bench::thread_us;
+
 constexpr int views = 36;
 constexpr int frames = 400;
 constexpr int samples_an_object = 360;
-
-double thread_us() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) / 1e3;
-}
-
-/// Durations of one stage, µs.
-class Series {
- public:
-  explicit Series(std::string name) : name_(std::move(name)) {}
-  void add(double us) { us_.push_back(us); }
-  void print() {
-    std::sort(us_.begin(), us_.end());
-    std::printf("  %-28s p50 %8.1f µs   p99 %8.1f µs\n", name_.c_str(), us_[us_.size() / 2],
-                us_[us_.size() * 99 / 100]);
-  }
-  [[nodiscard]] double median() {
-    std::sort(us_.begin(), us_.end());
-    return us_[us_.size() / 2];
-  }
-
- private:
-  std::string name_;
-  std::vector<double> us_;
-};
 
 double us(Duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
