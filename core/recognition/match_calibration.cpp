@@ -234,6 +234,7 @@ std::vector<MatchEvidence> measure_match(const Model& model, const ViewStore& vi
   });
   const double growth = error_growth(probes);
   std::vector<MatchEvidence> evidence;
+  evidence.reserve(probes.size());
   for (const auto& own : probes) evidence.push_back(weigh(own, growth));
   return evidence;
 }
@@ -253,7 +254,8 @@ MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
   }
   std::sort(scores.begin(), scores.end(), std::greater<>());
   std::sort(others.begin(), others.end());
-  result.smallest_rate = 1.0 / (static_cast<double>(scores.size() / options.moved_views) + 1.0);
+  const std::size_t views = scores.size() / options.moved_views;
+  result.smallest_rate = 1.0 / (static_cast<double>(views) + 1.0);
   const double rate = std::max(options.rate, result.smallest_rate);
   const auto rank = static_cast<std::size_t>(rate * (static_cast<double>(scores.size()) + 1.0));
   const double limit = scores[std::min(rank > 0 ? rank - 1 : 0, scores.size() - 1)];

@@ -164,8 +164,7 @@ TEST_F(ModbusAxisTest, SeveralAxesShareOneBus) {
 
 TEST_F(ModbusAxisTest, ADriveHasOneMasterAtATime) {
   SteadyClock clock;
-  const ModbusBusOptions line{
-      ModbusTcpEndpoint{"127.1", rig_.port()}};  // the same drive, spelt another way
+  const ModbusBusOptions line{ModbusTcpEndpoint{"127.1", rig_.port()}};  // the same drive, spelt another way
   EXPECT_NO_THROW(rig_.axis().state(soon()));
   ModbusAxisOptions options = rig_.options();
   ModbusAxis rival(oriental_motor_az_profile(), options, std::make_shared<ModbusBus>(line, clock), clock);
