@@ -71,6 +71,10 @@ struct ImageSetOptions {
   bool sync_every_view = true;
 };
 
+/// @throws std::invalid_argument for an object name that is not 1 to 64 of [A-Za-z0-9_.-] starting with a
+/// letter or digit.
+void check_object_name(const std::string& name);
+
 /// Writes an image set view by view. One thread at a time.
 class ImageSetWriter {
  public:
@@ -78,8 +82,7 @@ class ImageSetWriter {
   /// there).
   /// @param source a JSON object that says where the views come from; kept in set.json.
   /// @throws FileError when a complete set stands there already or the folder cannot be written;
-  /// std::invalid_argument for an object name that is not 1 to 64 of [A-Za-z0-9_.-] starting with a letter or
-  /// digit.
+  /// what check_object_name throws.
   ImageSetWriter(const std::filesystem::path& root, const std::string& object, Workspace workspace,
                  const nlohmann::json& source, ImageSetOptions options = {});
   ImageSetWriter(const ImageSetWriter&) = delete;

@@ -25,18 +25,6 @@ std::string cause(int error) {
   return std::strerror(error);
 }
 
-void check_object_name(const std::string& name) {
-  const auto alphanumeric = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
-  const bool good = !name.empty() && name.size() <= 64 && alphanumeric(name.front()) &&
-                    std::all_of(name.begin(), name.end(),
-                                [&](char c) { return alphanumeric(c) || c == '_' || c == '.' || c == '-'; });
-  if (!good)
-    throw std::invalid_argument(
-        "\"" + name +
-        "\" cannot be an object's name; use 1 to 64 of A-Z a-z 0-9 _ . - and begin with a "
-        "letter or digit");
-}
-
 /// Appends to a file and tells whether all of it arrived.
 void append(const std::filesystem::path& file, const std::string& text, bool sync) {
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
@@ -60,6 +48,18 @@ void write_plain(const std::filesystem::path& file, const std::vector<unsigned c
 }
 
 }  // namespace
+
+void check_object_name(const std::string& name) {
+  const auto alphanumeric = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  const bool good = !name.empty() && name.size() <= 64 && alphanumeric(name.front()) &&
+                    std::all_of(name.begin(), name.end(),
+                                [&](char c) { return alphanumeric(c) || c == '_' || c == '.' || c == '-'; });
+  if (!good)
+    throw std::invalid_argument(
+        "\"" + name +
+        "\" cannot be an object's name; use 1 to 64 of A-Z a-z 0-9 _ . - and begin with a "
+        "letter or digit");
+}
 
 ImageSetWriter::ImageSetWriter(const std::filesystem::path& root, const std::string& object,
                                Workspace workspace, const json& source, ImageSetOptions options)

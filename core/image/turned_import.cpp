@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
@@ -22,6 +24,47 @@ cv::Mat in_a_square(const cv::Mat& cut, const Background& background) {
   cv::Mat square(side, side, cut.type(), background.color());
   cut.copyTo(square(cv::Rect((side - cut.cols) / 2, (side - cut.rows) / 2, cut.cols, cut.rows)));
   return square;
+}
+
+/// Nothing is begun that cannot be finished. @param names as given, or made.
+void check_names(const std::vector<std::string>& names, std::size_t parts,
+                 const std::filesystem::path& picture, const std::filesystem::path& root) {
+  if (names.size() != parts)
+    throw FileError(picture, "shows " + std::to_string(parts) + " parts, but " +
+                                 std::to_string(names.size()) +
+                                 " names are given; give one a part, from left to right");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    check_object_name(names[i]);
+    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
+        names.begin() + static_cast<std::ptrdiff_t>(i))
+      throw std::invalid_argument("two parts are named \"" + names[i] +
+                                  "\"; every part is an object of its own");
+    if (std::filesystem::exists(root / names[i]))
+      throw FileError(root / names[i], "stands there already; remove it or give the part another name");
+  }
+}
+
+/// Writes the image set of one part; leaves nothing where it fails.
+void write_turns(const cv::Mat& square, const cv::Scalar& background, const std::filesystem::path& root,
+                 const std::string& name, const nlohmann::json& source, std::size_t views,
+                 const std::function<void(std::size_t)>& step) {
+  ImageSetWriter writer(root, name, turntable_workspace(), source, {.sync_every_view = false});
+  try {
+    const auto middle = 0.5F * static_cast<float>(square.cols - 1);
+    for (std::size_t v = 0; v < views; ++v) {
+      step(v);
+      const double degrees = 360.0 * static_cast<double>(v) / static_cast<double>(views);
+      cv::Mat turned;
+      cv::warpAffine(square, turned, cv::getRotationMatrix2D({middle, middle}, degrees, 1.0), square.size(),
+                     cv::INTER_LINEAR, cv::BORDER_CONSTANT, background);
+      writer.add(turned, {degrees});
+    }
+    writer.finish();
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove_all(root / name, ignored);
+    throw;
+  }
 }
 
 }  // namespace
@@ -45,29 +88,19 @@ std::vector<std::string> import_turned(const std::filesystem::path& picture,
   std::vector<std::string> names = options.names;
   if (names.empty())
     for (std::size_t i = 0; i < parts.size(); ++i) names.push_back("part" + std::to_string(i + 1));
-  if (names.size() != parts.size())
-    throw FileError(picture, "shows " + std::to_string(parts.size()) + " parts, but " +
-                                 std::to_string(names.size()) +
-                                 " names are given; give one a part, from left to right");
+  check_names(names, parts.size(), picture, root);
 
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    const Background& background = segmenter.background();
-    const cv::Mat square = in_a_square(segmenter.cut_out(image, parts[p]), background);
-    const auto middle = 0.5F * static_cast<float>(square.cols - 1);
-    const nlohmann::json source = {{"imported_from", std::filesystem::absolute(picture).string()},
-                                   {"turned", true}};
-    ImageSetWriter writer(root, names[p], turntable_workspace(), source, {.sync_every_view = false});
-    for (std::size_t v = 0; v < options.views; ++v) {
-      if (stop.stop_requested()) throw Interrupted("interrupted; the sets finished before are kept");
-      const double degrees = 360.0 * static_cast<double>(v) / static_cast<double>(options.views);
-      cv::Mat turned;
-      cv::warpAffine(square, turned, cv::getRotationMatrix2D({middle, middle}, degrees, 1.0), square.size(),
-                     cv::INTER_LINEAR, cv::BORDER_CONSTANT, background.color());
-      writer.add(turned, {degrees});
-      if (progress) progress({"turning", p * options.views + v + 1, parts.size() * options.views});
-    }
-    writer.finish();
-  }
+  const nlohmann::json source = {{"imported_from", std::filesystem::absolute(picture).string()},
+                                 {"turned", true}};
+  const Background& background = segmenter.background();
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    write_turns(in_a_square(segmenter.cut_out(image, parts[p]), background), background.color(), root,
+                names[p], source, options.views, [&](std::size_t view) {
+                  if (stop.stop_requested())
+                    throw Interrupted("interrupted; the sets finished before are kept");
+                  if (progress)
+                    progress({"turning", p * options.views + view + 1, parts.size() * options.views});
+                });
   return names;
 }
 

@@ -251,9 +251,9 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
   }
   if (model->parts) {
     report.smallest_rate = model->parts->smallest_rate;
-    for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->parts->memory(o);
-    report.model_bytes /= model->objects.size();
   }
+  for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->memory(o);
+  report.model_bytes /= model->objects.size();
   if (options.leave_one_out) show_strangers(model, sets, tests, options, report, progress, stop);
   return report;
 }

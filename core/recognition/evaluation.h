@@ -74,7 +74,7 @@ struct EvaluationReport {
   std::size_t strangers = 0;      ///< views shown to models without their object
   std::size_t false_accepts = 0;  ///< of these, taken for another object
   double smallest_rate = 1.0;     ///< of wrong rejections, that the learned views can support
-  std::size_t model_bytes = 0;    ///< of windows and pose spaces, mean of an object
+  std::size_t model_bytes = 0;    ///< Model::memory, mean of an object
 
   /// 0…1
   [[nodiscard]] double recognition_rate() const;

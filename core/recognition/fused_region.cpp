@@ -94,6 +94,7 @@ FusedRegion::FusedRegion(const NormalizationOptions& normalization, const PartsM
 void FusedRegion::group_extents(double same) {
   for (std::size_t o = 0; o < parts_.extents.size(); ++o) {
     for (const cv::Size& size : parts_.extents[o]) {
+      if (size.empty()) continue;  // of an object that came ready-cut
       least_ = {std::min(least_.width, size.width), std::min(least_.height, size.height)};
       const double side = std::max(size.width, size.height);
       const auto like = std::ranges::find_if(extents_, [&](const Extent& known) {
@@ -160,7 +161,8 @@ FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t
   const PartsPose& pose = object.found.best.poses.front();
   const std::vector<cv::Size>& extents = parts_.extents[object.found.best.object];
   // The size of the learned view nearest in pose, about the middle that alignment found.
-  const cv::Size size = extents[nearest_view(parts_.poses[object.found.best.object], pose.q)];
+  const cv::Size learned = extents[nearest_view(parts_.poses[object.found.best.object], pose.q)];
+  const cv::Size size = learned.empty() ? box.size() : learned;
   const double side = std::max(box.width, box.height);
   const double x = box.x + 0.5 * box.width + side * pose.misalignment.dx;
   const double y = box.y + 0.5 * box.height + side * pose.misalignment.dy;

@@ -59,7 +59,7 @@ class FusedRegion {
   std::vector<Trial> trials(const cv::Rect& outline, double visible);
   /// The object in a box, its box set right by what alignment found.
   FusedObject settle(const cv::Rect& box, std::span<const std::size_t> shortlist);
-  /// What may stand in a corner of `outline` and is sure enough, surest first.
+  /// What may stand in a corner of `outline` and is sure enough, surest first. @param visible as in trials.
   std::vector<FusedObject> candidates(const cv::Rect& outline, double visible);
   /// The foreground pixels that an object takes up.
   cv::Mat silhouette(const FusedObject& object) const;

@@ -6,6 +6,7 @@
 
 #include "core/image/normalization.h"
 #include "core/parts/covered_calibration.h"
+#include "core/recognition/likelihood.h"
 
 namespace eigenpose {
 namespace {
@@ -97,12 +98,6 @@ RealignedDistance PartsStage::distance_of(std::span<const float> picture, const 
   return match_.distance(picture, answer.poses.front().misalignment, answer.object);
 }
 
-double PartsStage::likelihood(std::size_t object, double distance, double over) const {
-  const double typical = model_.parts->calibration[object].typical_distance;
-  const double variance = std::max(typical * typical / effective_dimensions, 1e-12);
-  return std::exp(-(distance * distance - over * over) / (2.0 * variance));
-}
-
 void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
   PartsIdentification found = recognizer_.identify();
   RealignedDistance distance = distance_of(picture, found.best);
@@ -113,7 +108,8 @@ void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
       std::swap(found.best, *found.second);
       std::swap(distance, second);
     }
-    found.tie = 1.0 < sure_enough * (1.0 + likelihood(found.best.object, second.own, distance.own));
+    found.tie =
+        is_ambiguous(likelihood(second.own, distance.own, model_.typical_distance(found.best.object)));
   }
   describe(found, distance, accepted(found, distance), picture, outcome);
 }
@@ -172,7 +168,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
         std::clamp((1.0 - finding.covered) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
   } else {
     const auto beside = [&](double distance) {
-      return likelihood(finding.object, distance, finding.distance.own);
+      return likelihood(distance, finding.distance.own, calibration.typical_distance);
     };
     const double second = finding.distance.other ? beside(finding.distance.other->distance) : 0.0;
     outcome.confidence = 1.0 / (1.0 + second + beside(calibration.rejection_distance));

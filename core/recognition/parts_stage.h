@@ -20,11 +20,6 @@ namespace eigenpose {
 
 /// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
 inline constexpr double poses_apart = 1.0 / 12.0;
-/// Numbers of a point that vary independently when a view is moved: the typical distance spreads over about
-/// so many. It turns distances into likelihoods.
-inline constexpr double effective_dimensions = 6.0;
-/// Below this probability of the best object or pose against the second best, the outcome is ambiguous.
-inline constexpr double sure_enough = 0.7;
 
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
@@ -60,8 +55,6 @@ class PartsStage {
   void describe(const Finding& finding, bool accepted, Outcome& outcome) const;
   /// Distance once a pose of the answer's object is undone, the best one.
   RealignedDistance distance_of(std::span<const float> picture, const PartsAnswer& answer);
-  /// How likely a region of this object is at one distance over another.
-  [[nodiscard]] double likelihood(std::size_t object, double distance, double over) const;
   [[nodiscard]] bool accepted(const PartsIdentification& found, const RealignedDistance& distance) const;
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 

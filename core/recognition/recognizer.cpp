@@ -11,6 +11,7 @@
 #include "core/image/segmentation.h"
 #include "core/manifold/pattern_rejector.h"
 #include "core/manifold/search.h"
+#include "core/recognition/likelihood.h"
 #include "core/recognition/own_spaces.h"
 #include "core/recognition/parts_stage.h"
 #include "core/recognition/pose_table.h"
@@ -206,18 +207,16 @@ void Recognizer::Impl::judge(Outcome& outcome) {
     return;
   }
   outcome.verdict = Verdict::recognized;
-  const double variance =
-      std::max(1e-12, object.typical_distance * object.typical_distance / effective_dimensions);
-  const auto likelihood = [&](double distance) {
-    return std::exp(-(distance * distance - best.distance * best.distance) / (2.0 * variance));
+  const auto beside = [&](double distance) {
+    return likelihood(distance, best.distance, object.typical_distance);
   };
-  const double second = closest_count > 1 ? likelihood(closest[1].distance) : 0.0;
-  if (1.0 < sure_enough * (1.0 + second)) outcome.verdict = Verdict::ambiguous;
-  outcome.confidence = 1.0 / (1.0 + second + likelihood(object.rejection_distance));
+  const double second = closest_count > 1 ? beside(closest[1].distance) : 0.0;
+  if (is_ambiguous(second)) outcome.verdict = Verdict::ambiguous;
+  outcome.confidence = 1.0 / (1.0 + second + beside(object.rejection_distance));
   estimate_pose(outcome, best);
   const std::span<double> q(other_q.data(), object.workspace.size());
   const auto other = poses[best.manifold].other_minimum(point, outcome.best->q, poses_apart, q);
-  if (other && 1.0 < sure_enough * (1.0 + likelihood(std::max(best.distance, other->distance)))) {
+  if (other && is_ambiguous(beside(std::max(best.distance, other->distance)))) {
     outcome.other_pose = take_spare();
     outcome.other_pose->object = object.name;
     outcome.other_pose->q.assign(q.begin(), q.end());

@@ -128,6 +128,8 @@ void add_turned(CLI::App& import, CommandLine& line) {
 void add_import_command(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("import", "Turn photographs into image sets");
   command->require_subcommand(1);
+  command->footer(
+      "'eigenpose import coil --help' and 'eigenpose import turned --help' explain them, with examples.");
   add_coil(*command, line);
   add_turned(*command, line);
 }

@@ -58,7 +58,8 @@ nlohmann::json resemblance_json(const Model& model) {
 }
 
 void print_resemblance(const Model& model) {
-  print(model, alike_objects(model), "objects that pass for each other where the other is not known");
+  print(model, alike_objects(model),
+        "objects that look alike: a view of one would pass for the other, were it not known itself");
   print(model, alike_poses(model), "poses that look like another of the same object");
 }
 

@@ -123,10 +123,10 @@ std::uint32_t AptController::status_bits(TimePoint now) const {
 }
 
 void AptController::say_status(std::uint16_t number) {
-  if (updates_unanswered_ >= patience_with_host) return;
-  ++updates_unanswered_;
   const TimePoint now = lab_.clock().now();
   finish_motion(now);  // a motion that has ended by now has ended with all that comes with it
+  if (updates_unanswered_ >= patience_with_host) return;
+  ++updates_unanswered_;
   std::vector<std::uint8_t> data;
   append(data, 1, 2);
   append(data, static_cast<std::uint32_t>(std::llround(counts_at(now))), 4);

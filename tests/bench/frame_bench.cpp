@@ -91,13 +91,7 @@ class PlainPipeline {
 
 /// The camera stands as far from the table when objects are learned as when they are recognised.
 testing::SceneKnobs one_object() {
-  testing::SceneKnobs knobs;
-  knobs.width = 320;
-  knobs.height = 240;
-  knobs.x = 160.0;
-  knobs.y = 120.0;
-  knobs.scale = 3.2;
-  return knobs;
+  return testing::SceneKnobs::centred(320, 240, 3.2);
 }
 
 std::vector<cv::Mat> make_frames(int objects) {

@@ -34,13 +34,7 @@ constexpr std::size_t shortlist_length = 10;
 
 /// An object that fills the picture, as a camera that stands still sees it.
 testing::SceneKnobs close_up() {
-  testing::SceneKnobs knobs;
-  knobs.width = 160;
-  knobs.height = 160;
-  knobs.x = 80.0;
-  knobs.y = 80.0;
-  knobs.scale = 2.0;
-  return knobs;
+  return testing::SceneKnobs::centred(160, 160, 2.0);
 }
 
 struct Region {

@@ -21,6 +21,17 @@ struct SceneKnobs {
   int background = 8;
   double noise_sigma = 1.0;  ///< grey levels
   bool color = true;
+
+  /// An object in the middle of a picture.
+  static SceneKnobs centred(int width, int height, double scale) {
+    SceneKnobs knobs;
+    knobs.width = width;
+    knobs.height = height;
+    knobs.x = 0.5 * width;
+    knobs.y = 0.5 * height;
+    knobs.scale = scale;
+    return knobs;
+  }
 };
 
 /// Adds object number `kind` (any number; each differs) turned by `angle_deg` to `picture`.

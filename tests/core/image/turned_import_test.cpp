@@ -77,12 +77,28 @@ TEST_F(TurnedImport, SaysWhatIsWrong) {
   } catch (const FileError& error) {
     EXPECT_THAT(error.what(), HasSubstr("2 parts, but 1 names"));
   }
+  EXPECT_THROW(import_turned(picture(), sets(), {.names = {"plate", "plate"}}), std::invalid_argument);
+  EXPECT_THROW(import_turned(picture(), sets(), {.names = {"plate", "no name"}}), std::invalid_argument);
+  std::filesystem::create_directories(sets() / "disc");
+  EXPECT_THROW(import_turned(picture(), sets(), {.names = {"plate", "disc"}}), FileError);
   EXPECT_FALSE(std::filesystem::exists(sets() / "plate")) << "nothing was begun";
   EXPECT_THROW(import_turned(picture(), sets(), {.views = 1}), std::invalid_argument);
   const auto empty = sets().parent_path() / "empty.png";
   cv::imwrite(empty, cv::Mat(100, 100, CV_8UC1, cv::Scalar(20)));
   EXPECT_THROW(import_turned(empty, sets(), {}), FileError);
   EXPECT_THROW(import_turned(sets() / "absent.png", sets(), {}), FileError);
+}
+
+TEST_F(TurnedImport, LeavesNoUnfinishedSetWhenInterrupted) {
+  std::stop_source stop;
+  const auto in_the_second = [&](const ProgressUpdate& report) {
+    if (report.done == 5) stop.request_stop();
+  };
+  EXPECT_THROW(import_turned(picture(), sets(), {.names = {"plate", "disc"}, .views = 4}, in_the_second,
+                             stop.get_token()),
+               Interrupted);
+  EXPECT_TRUE(ImageSet::open(sets() / "plate").complete());
+  EXPECT_FALSE(std::filesystem::exists(sets() / "disc"));
 }
 
 }  // namespace

@@ -25,12 +25,8 @@ struct PartsWorld {
     model = std::make_shared<const Model>(learn(all_views(sets), options));
   }
   static SceneKnobs knobs() {
-    SceneKnobs knobs;
-    knobs.width = 400;
-    knobs.height = 300;
-    knobs.x = 130.0;
-    knobs.y = 150.0;
-    knobs.scale = 1.6;
+    SceneKnobs knobs = SceneKnobs::centred(400, 300, 1.6);
+    knobs.x = 130.0;  // there is room for another beside it
     return knobs;
   }
   test::TemporaryFolder folder;
@@ -75,6 +71,20 @@ TEST(FusedRegion, TellsTouchingObjectsApart) {
     ++right;
   }
   EXPECT_GE(right, pairs - 2) << "of " << pairs;
+}
+
+TEST(FusedRegion, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
+  Model model = *world().model;
+  auto parts = std::make_shared<PartsModel>(*model.parts);
+  ASSERT_EQ(model.objects[1].name, "three");
+  for (cv::Size& size : parts->extents[1]) size = {};
+  model.parts = parts;
+  Recognizer recognize(std::make_shared<const Model>(model));
+  const cv::Mat scene = touching(1, 5.0, 2, 70.0, recognize);
+  const auto outcomes = recognize.recognize(scene);
+  ASSERT_EQ(outcomes.size(), 2U);
+  EXPECT_EQ(outcomes[0].best->object, "one");
+  EXPECT_EQ(outcomes[1].best->object, "two");
 }
 
 TEST(FusedRegion, LeavesStrangersInOnePiece) {

@@ -170,6 +170,9 @@ TEST_F(Learning, LearnsPoseAndLightTogether) {
     for (int light = -40; light <= 40; light += 20) writer.add(lit(table, light), {1.0 * table, 1.0 * light});
   writer.finish();
   const auto sets = open_image_sets(root());
+  LearningOptions too_few = testing::small_learning();
+  too_few.solver.components = 2;
+  EXPECT_THROW(learn(all_views(sets), too_few), Error) << "the manifold would fill its space";
   const auto model = std::make_shared<const Model>(learn(all_views(sets), testing::small_learning()));
   ASSERT_EQ(model->objects[0].dof_observable, (std::vector<bool>{true, true}));
   Recognizer recognizer(model);
