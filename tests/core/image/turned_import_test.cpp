@@ -27,7 +27,7 @@ cv::Mat two_parts() {
 class TurnedImport : public ::testing::Test {
  protected:
   std::filesystem::path picture() {
-    const auto file = folder_.path() / "parts.png";
+    auto file = folder_.path() / "parts.png";
     cv::imwrite(file, two_parts());
     return file;
   }

@@ -13,7 +13,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::SceneKnobs;
-using ::testing::ThrowsMessage;
 
 class Learning : public ::testing::Test {
  protected:
@@ -36,6 +35,7 @@ class Learning : public ::testing::Test {
   }
   static std::vector<cv::Mat> turn(int views) {
     std::vector<cv::Mat> pictures;
+    pictures.reserve(static_cast<std::size_t>(views));
     for (int i = 0; i < views; ++i) pictures.push_back(testing::scene_with(1, 360.0 * i / views));
     return pictures;
   }
