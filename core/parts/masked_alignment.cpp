@@ -11,9 +11,9 @@
 namespace eigenpose {
 namespace {
 
-constexpr double free_gain = 1.0;  // a cover changes the energy: 1 σ of the gain
-constexpr int rounds = 5;
-constexpr int trusting_rounds = 2;  // the first ones, weighted by what the windows trust
+constexpr double free_gain = 1.0;   // a cover changes the energy: 1 σ of the gain
+constexpr int trusting_rounds = 2;  // weighted by what the windows trust
+constexpr int robust_rounds = 3;    // weighted by what the pose leaves unexplained
 constexpr int steps = 15;           // samples each way within the reach
 /// A pixel's variance, as a multiple of the noise that the splines leave spread over all pixels.
 constexpr double variance_of_pixels = 6.0;
@@ -23,6 +23,13 @@ constexpr double most_unexplained = 4.5;  // ½·3²
 constexpr float dark = 0.01F;
 constexpr float trusted = 0.2F;
 constexpr double deviation_of_median = 1.4826;  // σ over the median of |r|, for normal r
+
+/// Between the poses that a round looks at, as a share of a DOF's range: half as far every round.
+double step_of_round(int round, double reach) {
+  const double least = 0.5 / 360.0;
+  const double step = reach / (steps * (1 << round));
+  return round == 0 ? step : std::max(step, least);
+}
 
 }  // namespace
 
@@ -37,6 +44,7 @@ void MaskedAligner::look(const PosePicture& picture, const PoseSpace& space, std
   space_ = &space;
   trust_ = trust;
   pixel_variance_ = variance_of_pixels * options_.noise / static_cast<double>(space.coarse().basis.rows());
+  trusted_quadratic_known_ = false;
 }
 
 double MaskedAligner::first_gain() const {
@@ -64,13 +72,10 @@ void MaskedAligner::weigh_by_residual() {
   weights_ = (1.0F + scale * (rendered_ - warped_.col(0)).array().square()).square().inverse().matrix();
 }
 
-void MaskedAligner::prepare(const Misalignment& misalignment, double first_gain) {
+void MaskedAligner::weigh_basis() {
   const Eigen::MatrixXf& basis = space_->coarse().basis;
   const auto pixels = static_cast<int>(basis.rows());
   const auto dims = static_cast<int>(basis.cols());
-  weighted_.resize(pixels, 6);
-  weighted_.col(0) = weights_.cwiseProduct(space_->pixel_mean() - warped_.col(0));
-  weighted_.rightCols(5) = warped_.rightCols(5).array().colwise() * weights_.array();
   weighted_basis_ = basis.array().colwise() * weights_.array();
   // Its lower half, six columns at a time; the last ones again where D is no multiple of six.
   quadratic_.resize(dims, dims);
@@ -83,6 +88,15 @@ void MaskedAligner::prepare(const Misalignment& misalignment, double first_gain)
                               quadratic_.col(from).data() + from, dims);
     }
   }
+}
+
+void MaskedAligner::prepare(const Misalignment& misalignment, double first_gain) {
+  const Eigen::MatrixXf& basis = space_->coarse().basis;
+  const auto pixels = static_cast<int>(basis.rows());
+  const auto dims = static_cast<int>(basis.cols());
+  weighted_.resize(pixels, 6);
+  weighted_.col(0) = weights_.cwiseProduct(space_->pixel_mean() - warped_.col(0));
+  weighted_.rightCols(5) = warped_.rightCols(5).array().colwise() * weights_.array();
   linear_.resize(dims, 6);
   multiply_transposed_six(basis.data(), pixels, dims, weighted_.data(), linear_.data(), dims);
   const Eigen::VectorXf difference = space_->pixel_mean() - warped_.col(0);
@@ -111,72 +125,92 @@ double MaskedAligner::cost_at(const std::vector<double>& q, Vector5* x) {
   return std::max(0.0, squared) + prior_cost_ - b.dot(best);
 }
 
-MaskedPose MaskedAligner::follow(const std::vector<double>& start, double reach) {
-  const PoseScale& scale = space_->coarse();
+void MaskedAligner::move(MaskedPose& masked, double step_share) {
+  AlignedPose& pose = masked.aligned;
   const auto axes = space_->coarse_manifold().axes();
-  MaskedPose end;
-  AlignedPose& pose = end.aligned;
+  std::vector<double> q = pose.q;
+  double lowest = cost_at(q, nullptr);
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    if (axes[a].samples.size() < 2) continue;
+    const double step = step_share * axes[a].dof.period();
+    const double centre = q[a];
+    costs_.clear();
+    for (int s = -steps; s <= steps; ++s) {
+      q[a] = centre + s * step;
+      costs_.push_back(cost_at(q, nullptr));
+    }
+    const auto best = std::min_element(costs_.begin(), costs_.end());
+    const auto at = static_cast<int>(best - costs_.begin());
+    double offset = 0.0;
+    if (at > 0 && at < 2 * steps) {
+      const double curvature = *(best - 1) - 2.0 * *best + *(best + 1);
+      if (curvature > 0.0) {
+        offset = 0.5 * (*(best - 1) - *(best + 1)) / curvature;
+        pose.q_sigma[a] = step * std::sqrt(2.0 * std::max(*best, options_.noise) /
+                                           (curvature * static_cast<double>(quadratic_.cols())));
+      }
+    }
+    q[a] = axes[a].dof.canonical(centre + (at - steps + offset) * step);
+    lowest = std::min(lowest, *best);
+  }
+  pose.q = q;
+  pose.cost = lowest;
+  pose.fine_cost = lowest;
+  Vector5 x;
+  cost_at(pose.q, &x);
+  const Vector5 limit = 3.0 * precision_.cwiseInverse().cwiseSqrt();
+  const double gain = masked.first_gain;
+  const Misalignment& p = pose.misalignment;
+  Vector5 moved;
+  moved << p.gain - gain + x(0), p.dx + x(1), p.dy + x(2), p.scale + x(3), p.rotation + x(4);
+  moved = moved.cwiseMax(-limit).cwiseMin(limit);
+  pose.misalignment = {std::clamp(moved(0) + gain, -0.8, 5.0), moved(1), moved(2), moved(3), moved(4)};
+}
+
+MaskedPose MaskedAligner::approach(const std::vector<double>& start, double reach) {
+  MaskedPose masked;
+  AlignedPose& pose = masked.aligned;
   pose.q = start;
   pose.q_sigma.assign(start.size(), std::numeric_limits<double>::infinity());
-  weights_ = Eigen::Map<const Eigen::VectorXf>(trust_.data(), scale.basis.rows());
-  scale.warp(*picture_, {}, false, warped_);
-  space_->render(start, rendered_);
-  const double gain = first_gain();
-  pose.misalignment.gain = gain;
-  double step_share = reach / steps;
-  const Vector5 limit = 3.0 * precision_.cwiseInverse().cwiseSqrt();
-  for (int round = 0; round < rounds; ++round) {
-    scale.warp(*picture_, pose.misalignment, true, warped_);
-    if (round >= trusting_rounds) {
-      space_->render(pose.q, rendered_);
-      weigh_by_residual();
-    }
-    prepare(pose.misalignment, gain);
-    std::vector<double> q = pose.q;
-    double lowest = cost_at(q, nullptr);
-    for (std::size_t a = 0; a < axes.size(); ++a) {
-      if (axes[a].samples.size() < 2) continue;
-      const double step = step_share * axes[a].dof.period();
-      const double centre = q[a];
-      costs_.clear();
-      for (int s = -steps; s <= steps; ++s) {
-        q[a] = centre + s * step;
-        costs_.push_back(cost_at(q, nullptr));
-      }
-      const auto best = std::min_element(costs_.begin(), costs_.end());
-      const auto at = static_cast<int>(best - costs_.begin());
-      double offset = 0.0;
-      if (at > 0 && at < 2 * steps) {
-        const double curvature = *(best - 1) - 2.0 * *best + *(best + 1);
-        if (curvature > 0.0) {
-          offset = 0.5 * (*(best - 1) - *(best + 1)) / curvature;
-          pose.q_sigma[a] = step * std::sqrt(2.0 * std::max(*best, options_.noise) /
-                                             (curvature * static_cast<double>(scale.basis.cols())));
-        }
-      }
-      q[a] = axes[a].dof.canonical(centre + (at - steps + offset) * step);
-      lowest = std::min(lowest, *best);
-    }
-    pose.q = q;
-    pose.cost = lowest;
-    Vector5 x;
-    cost_at(pose.q, &x);
-    const Misalignment& p = pose.misalignment;
-    Vector5 moved;
-    moved << p.gain - gain + x(0), p.dx + x(1), p.dy + x(2), p.scale + x(3), p.rotation + x(4);
-    moved = moved.cwiseMax(-limit).cwiseMin(limit);
-    pose.misalignment = {std::clamp(moved(0) + gain, -0.8, 5.0), moved(1), moved(2), moved(3), moved(4)};
-    step_share = std::max(step_share * 0.5, 0.5 / 360.0);
+  weights_ = Eigen::Map<const Eigen::VectorXf>(trust_.data(), static_cast<Eigen::Index>(trust_.size()));
+  if (!trusted_quadratic_known_) {
+    weigh_basis();
+    trusted_quadratic_ = quadratic_;
+    trusted_quadratic_known_ = true;
+  } else {
+    quadratic_ = trusted_quadratic_;
   }
-  pose.fine_cost = pose.cost;
+  space_->coarse().warp(*picture_, {}, false, warped_);
+  space_->render(start, rendered_);
+  masked.first_gain = first_gain();
+  pose.misalignment.gain = masked.first_gain;
+  for (int round = 0; round < trusting_rounds; ++round) {
+    space_->coarse().warp(*picture_, pose.misalignment, true, warped_);
+    prepare(pose.misalignment, masked.first_gain);
+    move(masked, step_of_round(round, reach));
+  }
+  return masked;
+}
+
+void MaskedAligner::refine(MaskedPose& masked, double reach) {
+  AlignedPose& pose = masked.aligned;
+  const PoseScale& scale = space_->coarse();
+  for (int round = trusting_rounds; round < trusting_rounds + robust_rounds; ++round) {
+    scale.warp(*picture_, pose.misalignment, true, warped_);
+    space_->render(pose.q, rendered_);
+    weigh_by_residual();
+    weigh_basis();
+    prepare(pose.misalignment, masked.first_gain);
+    move(masked, step_of_round(round, reach));
+  }
   scale.warp(*picture_, pose.misalignment, false, warped_);
   space_->render(pose.q, rendered_);
+  masked.unexplained = 0.0;
   const double half_precision = 0.5 / pixel_variance_;
   for (Eigen::Index i = 0; i < rendered_.size(); ++i) {
     const double difference = static_cast<double>(rendered_(i) - warped_(i, 0));
-    end.unexplained += std::min(half_precision * difference * difference, most_unexplained);
+    masked.unexplained += std::min(half_precision * difference * difference, most_unexplained);
   }
-  return end;
 }
 
 }  // namespace eigenpose

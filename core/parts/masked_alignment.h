@@ -18,7 +18,8 @@ namespace eigenpose {
 
 /// A pose of a partly covered object.
 struct MaskedPose {
-  AlignedPose aligned;  ///< its cost is over the visible pixels
+  AlignedPose aligned;      ///< its cost is over the visible pixels
+  double first_gain = 0.0;  ///< what makes the trusted pixels at the start as bright as the object's, minus 1
   /// What all pixels hold against the pose, in units of half a squared sigma of a pixel's noise; a pixel that
   /// is not explained at all counts no more than one that is 3 σ off, so covers cost every pose the same.
   double unexplained = 0.0;
@@ -29,12 +30,15 @@ class MaskedAligner {
  public:
   explicit MaskedAligner(const AlignmentOptions& options);
 
-  /// The region and the object that `follow` is about. Both must stay until the last call of it.
+  /// The region and the object that the others are about. Both must stay until the last call of them.
   /// @param trust 32×32 numbers 0…1, row by row.
   void look(const PosePicture& picture, const PoseSpace& space, std::span<const float> trust);
-  /// Follows the pose from `start` on the coarse scale.
+  /// The first rounds from a pose, on the coarse scale, by what the windows trust. Cheap beside `refine`.
   /// @param reach how far a round may move the pose, as a share of each DOF's range.
-  MaskedPose follow(const std::vector<double>& start, double reach);
+  MaskedPose approach(const std::vector<double>& start, double reach);
+  /// The later rounds, by what the pose explains.
+  /// @param reach as given to `approach`.
+  void refine(MaskedPose& pose, double reach);
 
  private:
   using Vector5 = Eigen::Matrix<double, 5, 1>;
@@ -43,10 +47,15 @@ class MaskedAligner {
   [[nodiscard]] double first_gain() const;
   /// Weights from what the rendered picture leaves unexplained of the warped region.
   void weigh_by_residual();
+  /// BᵀWB of the weights.
+  void weigh_basis();
   /// The normal equations of the weighted difference, for any pose: see cost_at.
   void prepare(const Misalignment& misalignment, double first_gain);
   /// Cost at a pose after its best further misalignment, which goes to `x`.
   double cost_at(const std::vector<double>& q, Vector5* x);
+  /// Moves a pose to the lowest cost along each DOF, then undoes its further misalignment.
+  /// @param step_share of each DOF's range, between the poses that are looked at.
+  void move(MaskedPose& pose, double step_share);
 
   AlignmentOptions options_;
   Vector5 precision_;
@@ -59,13 +68,15 @@ class MaskedAligner {
   Eigen::VectorXf rendered_;  ///< pixels
   Eigen::VectorXf weights_;   ///< pixels
   std::vector<float> residuals_;
-  Eigen::MatrixXf weighted_;        ///< pixels × 6: W(mean − f), then WJ
-  Eigen::MatrixXf weighted_basis_;  ///< pixels × D
-  Eigen::MatrixXf quadratic_;       ///< BᵀWB, D × D
-  Eigen::MatrixXf linear_;          ///< D × 6: Bᵀ weighted_
-  Eigen::VectorXf product_;         ///< D
-  double constant_ = 0.0;           ///< (mean − f)ᵀW(mean − f)
-  Vector5 constant_products_;       ///< JᵀW(mean − f)
+  Eigen::MatrixXf weighted_;           ///< pixels × 6: W(mean − f), then WJ
+  Eigen::MatrixXf weighted_basis_;     ///< pixels × D
+  Eigen::MatrixXf quadratic_;          ///< BᵀWB, D × D, its lower half
+  Eigen::MatrixXf trusted_quadratic_;  ///< the same of the trust
+  bool trusted_quadratic_known_ = false;
+  Eigen::MatrixXf linear_;     ///< D × 6: Bᵀ weighted_
+  Eigen::VectorXf product_;    ///< D
+  double constant_ = 0.0;      ///< (mean − f)ᵀW(mean − f)
+  Vector5 constant_products_;  ///< JᵀW(mean − f)
   Eigen::Matrix<double, 5, 5> inverse_;
   Vector5 prior_pull_;
   double prior_cost_ = 0.0;

@@ -23,6 +23,16 @@ float fast_exp_of_minus(float x) {
   return i < 0 ? 1.0F : i < size ? table[static_cast<std::size_t>(i)] : 0.0F;
 }
 
+/// Of numbers whose count is a multiple of eight.
+std::int32_t largest(const std::int32_t* numbers, std::size_t count) {
+  std::array<std::int32_t, WindowStore::group> most{};
+  std::copy_n(numbers, most.size(), most.begin());
+  for (std::size_t i = most.size(); i < count; i += most.size()) {
+    for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::max(most[k], numbers[i + k]);
+  }
+  return *std::ranges::max_element(most);
+}
+
 }  // namespace
 
 void make_query_windows(const CellMap& map, const WindowSpace& space, const WindowScale& scale,
@@ -41,7 +51,15 @@ void make_query_windows(const CellMap& map, const WindowSpace& space, const Wind
 
 PartialMatcher::PartialMatcher(std::span<const PartsObject> objects, const WindowScale& scale,
                                VotingOptions options)
-    : objects_(objects), scale_(scale), options_(options) {}
+    : objects_(objects), scale_(scale), options_(options) {
+  one_lane_each_.reserve(objects.size());
+  for (const PartsObject& object : objects) {
+    bool each = object.lane_candidate.size() == object.candidates.size();
+    for (std::size_t lane = 0; lane < object.lane_candidate.size() && each; ++lane)
+      each = object.lane_candidate[lane] == lane;
+    one_lane_each_.push_back(each);
+  }
+}
 
 float PartialMatcher::likeness(float energy, std::int32_t score) const {
   const float squared = energy - 2.0F * scale_.product() * static_cast<float>(score);
@@ -62,38 +80,43 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
   }
   const std::size_t count = query.windows.size();
   scores_.resize(count * row_length_);
-  lanes_.resize(most_lanes);
-  // One object after the other: its windows stay in the cache for all windows of the query.
-  for (const std::size_t o : shortlist) {
+  lanes_.resize(count * most_lanes);
+  placed_.place(query.windows, QueryWindows::stride, options_.tolerance, scale_);
+  bests_.resize(count * shortlist.size());
+  for (std::size_t i = 0; i < shortlist.size(); ++i) {
+    const std::size_t o = shortlist[i];
     const PartsObject& object = objects_[o];
+    object.store.best_scores(placed_, lanes_.data());
+    const std::size_t lanes = object.store.groups() * WindowStore::group;
+    const std::size_t candidates = object.candidates.size();
     for (std::size_t w = 0; w < count; ++w) {
-      const int row = static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride;
-      const int column = static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride;
-      object.store.best_scores(query.windows[w], row, column, options_.tolerance, scale_, lanes_.data());
+      const std::int32_t* lane_scores = lanes_.data() + w * lanes;
       std::int32_t* out = scores_.data() + w * row_length_ + offsets_[o];
-      std::fill_n(out, object.candidates.size(), std::numeric_limits<std::int32_t>::min());
-      for (std::size_t lane = 0; lane < object.lane_candidate.size(); ++lane) {
-        std::int32_t& best = out[object.lane_candidate[lane]];
-        best = std::max(best, lanes_[lane]);
+      if (one_lane_each_[o]) {
+        std::copy_n(lane_scores, candidates, out);
+      } else {
+        std::fill_n(out, candidates, std::numeric_limits<std::int32_t>::min());
+        for (std::size_t lane = 0; lane < object.lane_candidate.size(); ++lane) {
+          std::int32_t& best = out[object.lane_candidate[lane]];
+          best = std::max(best, lane_scores[lane]);
+        }
       }
+      // Places that are no views score far below all others.
+      bests_[w * shortlist.size() + i] = largest(lane_scores, lanes);
     }
   }
 
   votes_.assign(row_length_, 0.0F);
   background_.assign(count, 0.0F);
-  std::vector<std::int32_t> bests(shortlist.size());
   std::vector<std::int32_t> sorted;
   std::vector<float> kappas;
   const auto rank = static_cast<std::size_t>(options_.background_rank);
   for (std::size_t w = 0; w < count; ++w) {
     const std::int32_t* row = scores_.data() + w * row_length_;
-    for (std::size_t i = 0; i < shortlist.size(); ++i) {
-      const std::size_t o = shortlist[i];
-      bests[i] = *std::max_element(row + offsets_[o], row + offsets_[o] + objects_[o].candidates.size());
-    }
+    const auto bests = std::span(bests_).subspan(w * shortlist.size(), shortlist.size());
     std::int32_t floor = std::numeric_limits<std::int32_t>::min();
     if (shortlist.size() > rank) {
-      sorted = bests;
+      sorted.assign(bests.begin(), bests.end());
       std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1), sorted.end(),
                        std::greater<>());
       floor = sorted[rank - 1];

@@ -84,12 +84,15 @@ class PartialMatcher {
   std::span<const PartsObject> objects_;
   WindowScale scale_;
   VotingOptions options_;
+  std::vector<bool> one_lane_each_;  ///< objects whose candidates are their lanes
   const QueryWindows* query_ = nullptr;
   std::vector<std::size_t> offsets_;  ///< object → its first candidate in a row of scores_
   std::size_t row_length_ = 0;
   std::vector<std::int32_t> scores_;  ///< [81][candidates of the shortlist's objects]
-  std::vector<std::int32_t> lanes_;
-  std::vector<float> background_;  ///< [81] κ of the background
+  PlacedQueries placed_;
+  std::vector<std::int32_t> lanes_;  ///< [81][lanes of an object]
+  std::vector<std::int32_t> bests_;  ///< [81][shortlist]
+  std::vector<float> background_;    ///< [81] κ of the background
   std::vector<float> votes_;
   std::vector<PartialVote> result_;
 };

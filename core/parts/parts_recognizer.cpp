@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numeric>
 
 #include <opencv2/imgproc.hpp>
@@ -14,7 +16,10 @@ namespace {
 constexpr double window_count = QueryWindows::count;  // each window counts as one observation
 constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
 constexpr std::size_t most_revoted = 3;
-constexpr std::size_t most_covered_poses = 6;
+constexpr std::size_t most_covered_starts = 6;  // views whose neighbourhood is looked at first
+/// Of these so many are followed to the end, unless they are so much worse than the best of all objects.
+constexpr std::size_t most_covered_poses = 3;
+constexpr double hopeless_merit = 20.0;
 /// What votes, visible pixels and unexplained ones count for a covered pose; developed on learned views.
 constexpr double vote_merit = 2.0 * window_count;
 constexpr double visible_merit = 0.15 * window_count;
@@ -71,6 +76,20 @@ double votes_near(const std::vector<float>& votes, const PartsObject& object, co
 
 }  // namespace
 
+/// A pose of a covered object that is being followed.
+struct CoveredStart {
+  MaskedPose pose;
+  double votes = 0.0;
+  double merit = 0.0;
+};
+
+/// An object that may be seen behind a cover.
+struct CoveredAnswer {
+  PartsAnswer answer;
+  std::vector<float> trust;          ///< of the pixels, by the object's best view
+  std::vector<CoveredStart> starts;  ///< best first, not empty
+};
+
 struct PartsRecognizer::Impl {
   explicit Impl(const PartsModel& learned)
       : model(learned),
@@ -108,8 +127,13 @@ struct PartsRecognizer::Impl {
   const PosePicture& posed();
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   double foreign_share(std::size_t object, int candidate);
+  /// The same of the view with most votes.
+  double covered_share(std::size_t object, const std::vector<float>& plain);
   void find_poses(std::size_t object, const std::vector<float>& plain, PartsAnswer& answer);
-  void find_covered_poses(std::size_t object, const std::vector<float>& plain, PartsAnswer& answer);
+  CoveredAnswer approach_covered(std::size_t object, const std::vector<float>& plain, double covered);
+  /// Follows the starts of this merit and more to the end.
+  void refine_covered(CoveredAnswer& found, double hopeless);
+  void identify_covered(std::span<const PartialVote> votes, PartsIdentification& found);
   /// The pose of a candidate, moved by the parabola through its neighbours' votes.
   [[nodiscard]] std::vector<double> voted_pose(std::size_t object, const std::vector<float>& plain,
                                                int candidate) const;
@@ -137,6 +161,17 @@ double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
   const auto foreign =
       std::count_if(likeness.begin(), likeness.end(), [](float k) { return k < foreign_likeness; });
   return static_cast<double>(foreign) / static_cast<double>(likeness.size());
+}
+
+double PartsRecognizer::Impl::covered_share(std::size_t object, const std::vector<float>& plain) {
+  const PartsObject& parts = model.objects[object];
+  int best = 0;
+  for (std::size_t c = 0; c < plain.size(); ++c) {
+    if (!parts.candidates[c].mirrored && plain[c] > plain[static_cast<std::size_t>(best)]) {
+      best = static_cast<int>(c);
+    }
+  }
+  return foreign_share(object, best);
 }
 
 std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
@@ -221,9 +256,12 @@ std::vector<double> PartsRecognizer::Impl::voted_pose(std::size_t object, const 
   return q;
 }
 
-void PartsRecognizer::Impl::find_covered_poses(std::size_t object, const std::vector<float>& plain,
-                                               PartsAnswer& answer) {
+CoveredAnswer PartsRecognizer::Impl::approach_covered(std::size_t object, const std::vector<float>& plain,
+                                                      double covered) {
   const PartsObject& parts = model.objects[object];
+  CoveredAnswer found;
+  found.answer.object = object;
+  found.answer.covered = covered;
   // Views with more votes than their neighbours, most votes first.
   std::vector<int> peaks;
   for (std::size_t c = 0; c < plain.size(); ++c) {
@@ -237,26 +275,38 @@ void PartsRecognizer::Impl::find_covered_poses(std::size_t object, const std::ve
   std::sort(peaks.begin(), peaks.end(), [&](int a, int b) {
     return plain[static_cast<std::size_t>(a)] > plain[static_cast<std::size_t>(b)];
   });
-  peaks.resize(std::min(peaks.size(), most_covered_poses));
+  peaks.resize(std::min(peaks.size(), most_covered_starts));
   // What the best view trusts is what all poses are compared on.
   foreign_share(object, peaks.front());
-  const std::vector<float> trust = pixel_trust();
-  masked_aligner.look(posed(), model.poses[object], trust);
+  found.trust = pixel_trust();
+  masked_aligner.look(posed(), model.poses[object], found.trust);
+  found.starts.reserve(peaks.size());
   for (const int peak : peaks) {
-    const auto [found, unexplained] = masked_aligner.follow(voted_pose(object, plain, peak), masked_reach);
-    PartsPose pose{found.q,
-                   found.q_sigma,
-                   found.misalignment,
-                   found.cost,
-                   plain[static_cast<std::size_t>(peak)] / windows.total_weight,
-                   0.0};
-    pose.merit = vote_merit * pose.votes - visible_merit * std::log(std::max(found.cost, model.noise)) -
-                 unexplained_merit * unexplained;
-    answer.poses.push_back(std::move(pose));
+    CoveredStart start{masked_aligner.approach(voted_pose(object, plain, peak), masked_reach),
+                       plain[static_cast<std::size_t>(peak)] / windows.total_weight, 0.0};
+    start.merit =
+        vote_merit * start.votes - visible_merit * std::log(std::max(start.pose.aligned.cost, model.noise));
+    found.starts.push_back(std::move(start));
   }
-  std::stable_sort(answer.poses.begin(), answer.poses.end(),
-                   [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
-  answer.score = 1.0 - answer.poses.front().votes;
+  std::ranges::stable_sort(found.starts, std::greater<>(), &CoveredStart::merit);
+  return found;
+}
+
+void PartsRecognizer::Impl::refine_covered(CoveredAnswer& found, double hopeless) {
+  PartsAnswer& answer = found.answer;
+  masked_aligner.look(posed(), model.poses[answer.object], found.trust);
+  for (CoveredStart& start : found.starts) {
+    const bool followed = start.merit >= hopeless && answer.poses.size() < most_covered_poses;
+    if (!followed) break;
+    masked_aligner.refine(start.pose, masked_reach);
+    const AlignedPose& pose = start.pose.aligned;
+    const double merit = vote_merit * start.votes -
+                         visible_merit * std::log(std::max(pose.cost, model.noise)) -
+                         unexplained_merit * start.pose.unexplained;
+    answer.poses.push_back({pose.q, pose.q_sigma, pose.misalignment, pose.cost, start.votes, merit});
+  }
+  std::ranges::stable_sort(answer.poses, std::greater<>(), &PartsPose::merit);
+  if (!answer.poses.empty()) answer.score = 1.0 - answer.poses.front().votes;
 }
 
 PartsRecognizer::PartsRecognizer(const PartsModel& model) : impl_(std::make_unique<Impl>(model)) {}
@@ -296,42 +346,68 @@ double PartsRecognizer::share_of(std::size_t object) const {
 
 PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   Impl& impl = *impl_;
+  const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, object);
+  const double share = impl.covered_share(object, plain);
+  if (covered || share > impl.model.calibration[object].covered_share) {
+    CoveredAnswer found = impl.approach_covered(object, plain, share);
+    impl.refine_covered(found, found.starts.front().merit - hopeless_merit);
+    return std::move(found.answer);
+  }
   PartsAnswer answer;
   answer.object = object;
-  const PartsObject& parts = impl.model.objects[object];
-  const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, object);
-  int best = 0;
-  for (std::size_t c = 0; c < plain.size(); ++c) {
-    if (!parts.candidates[c].mirrored && plain[c] > plain[static_cast<std::size_t>(best)]) {
-      best = static_cast<int>(c);
-    }
-  }
-  answer.covered = impl.foreign_share(object, best);
-  if (covered || answer.covered > impl.model.calibration[object].covered_share) {
-    impl.find_covered_poses(object, plain, answer);
-  } else {
-    impl.find_poses(object, plain, answer);
-  }
+  answer.covered = share;
+  impl.find_poses(object, plain, answer);
   return answer;
 }
 
-PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist, bool covered) {
-  const Impl& impl = *impl_;
-  const auto votes = vote(shortlist);
-  PartsIdentification found;
-  found.best = settle(votes[0].object, covered);
-  covered = covered || found.best.covered > impl.model.calibration[found.best.object].covered_share;
-  if (covered) {
-    for (std::size_t i = 1; i < std::min(most_rivals, votes.size()); ++i) {
-      if (votes[i].score < rival_votes * votes[0].score) break;
-      PartsAnswer other = settle(votes[i].object, true);
-      const auto merit = [](const PartsAnswer& answer) { return answer.poses.front().merit; };
-      if (merit(other) > merit(found.best)) std::swap(other, found.best);
-      if (!found.second || merit(other) > merit(*found.second)) found.second = std::move(other);
-    }
+void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes, PartsIdentification& found) {
+  std::vector<CoveredAnswer> rivals;
+  const auto approach = [&](const PartialVote& vote) {
+    const std::vector<float> plain = matcher.plain_votes(windows, vote.object);
+    rivals.push_back(approach_covered(vote.object, plain, covered_share(vote.object, plain)));
+  };
+  for (std::size_t i = 0; i < std::min(most_rivals, votes.size()); ++i) {
+    if (votes[i].score < rival_votes * votes[0].score) break;
+    approach(votes[i]);
   }
-  if (!found.second && votes.size() > 1 && votes[1].score > 0.0F)
-    found.second = settle(votes[1].object, covered);
+  double most = -std::numeric_limits<double>::infinity();
+  for (const CoveredAnswer& rival : rivals) most = std::max(most, rival.starts.front().merit);
+  double best = -std::numeric_limits<double>::infinity();
+  for (CoveredAnswer& rival : rivals) {
+    refine_covered(rival, most - hopeless_merit);
+    if (!rival.answer.poses.empty()) best = std::max(best, rival.answer.poses.front().merit);
+  }
+  // A second object is told in any case, as near as it was come to.
+  const std::size_t contenders = rivals.size();
+  if (rivals.size() == 1 && votes.size() > 1 && votes[1].score > 0.0F) approach(votes[1]);
+  for (CoveredAnswer& rival : rivals) {
+    if (!rival.answer.poses.empty()) continue;
+    const CoveredStart& start = rival.starts.front();
+    const AlignedPose& pose = start.pose.aligned;
+    rival.answer.score = 1.0 - start.votes;
+    rival.answer.poses.push_back({pose.q, pose.q_sigma, pose.misalignment, pose.cost, start.votes,
+                                  best - std::max(most - start.merit, hopeless_merit)});
+  }
+  const auto ranked = std::span(rivals).first(contenders);
+  std::ranges::stable_sort(ranked, std::greater<>(),
+                           [](const CoveredAnswer& rival) { return rival.answer.poses.front().merit; });
+  found.best = std::move(rivals[0].answer);
+  if (rivals.size() > 1) found.second = std::move(rivals[1].answer);
+}
+
+PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist, bool covered) {
+  Impl& impl = *impl_;
+  const auto votes = vote(shortlist);
+  const std::size_t first = votes[0].object;
+  const double share = impl.covered_share(first, impl.matcher.plain_votes(impl.windows, first));
+  covered = covered || share > impl.model.calibration[first].covered_share;
+  PartsIdentification found;
+  if (covered) {
+    impl.identify_covered(votes, found);
+  } else {
+    found.best = settle(first);
+    if (votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);
+  }
   const auto votes_for = [&](const PartsAnswer& answer) {
     return static_cast<double>(std::ranges::find(votes, answer.object, &PartialVote::object)->score);
   };

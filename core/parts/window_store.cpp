@@ -81,22 +81,41 @@ void WindowStore::make_biases(const WindowScale& scale) {
   }
 }
 
-void WindowStore::best_scores(const QueryWindow& query, int row, int column,
-                              const PositionTolerance& tolerance, const WindowScale& scale,
-                              std::int32_t* scores) const {
+void PlacedQueries::place(std::span<const QueryWindow> queries, int stride,
+                          const PositionTolerance& tolerance, const WindowScale& scale) {
+  count_ = queries.size();
+  queries_.clear();
+  const int side = (WindowGrid::side - 1) / stride + 1;
   const int reach = tolerance.cells;
-  const std::size_t lanes = groups() * group;
-  std::fill_n(scores, lanes, -no_view);
-  for (int r = std::max(row - reach, 0); r <= std::min(row + reach, WindowGrid::side - 1); ++r) {
-    for (int c = std::max(column - reach, 0); c <= std::min(column + reach, WindowGrid::side - 1); ++c) {
-      const auto squared = static_cast<float>((r - row) * (r - row) + (c - column) * (c - column));
-      const auto penalty =
-          static_cast<std::int32_t>(std::lround(0.5F * tolerance.penalty * squared / scale.product()));
-      const auto p = static_cast<std::size_t>(r * WindowGrid::side + c);
-      raise_scores(values_.data() + p * groups() * block_bytes, biases_.data() + p * lanes, groups(),
-                   query.values.data(), penalty, scores);
+  // Of the queries 0, stride, … those within reach of a place.
+  const auto first = [&](int place) { return std::max(0, (place - reach + stride - 1) / stride); };
+  const auto last = [&](int place) { return std::min(side - 1, (place + reach) / stride); };
+  for (int r = 0; r < WindowGrid::side; ++r) {
+    for (int c = 0; c < WindowGrid::side; ++c) {
+      first_[static_cast<std::size_t>(r * WindowGrid::side + c)] = queries_.size();
+      for (int i = first(r); i <= last(r); ++i) {
+        for (int j = first(c); j <= last(c); ++j) {
+          const int down = r - i * stride;
+          const int right = c - j * stride;
+          const auto squared = static_cast<float>(down * down + right * right);
+          const auto index = static_cast<std::uint32_t>(i * side + j);
+          queries_.push_back(
+              {queries[index].values.data(),
+               static_cast<std::int32_t>(std::lround(0.5F * tolerance.penalty * squared / scale.product())),
+               index});
+        }
+      }
     }
   }
+  first_.back() = queries_.size();
+}
+
+void WindowStore::best_scores(const PlacedQueries& queries, std::int32_t* scores) const {
+  const std::size_t lanes = groups() * group;
+  std::fill_n(scores, queries.count() * lanes, -no_view);
+  for (std::size_t p = 0; p < WindowGrid::positions; ++p)
+    raise_scores(values_.data() + p * groups() * block_bytes, biases_.data() + p * lanes, groups(),
+                 queries.at(p), scores);
 }
 
 }  // namespace eigenpose

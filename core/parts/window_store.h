@@ -10,10 +10,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "core/parts/window_kernels.h"
 #include "core/parts/windows.h"
 
 namespace eigenpose {
@@ -42,6 +44,25 @@ struct PositionTolerance {
   float penalty = 0.01F;  ///< added to the squared distance per squared cell of offset
 };
 
+/// The windows of a region, by the learned places they are compared with. Value type.
+class PlacedQueries {
+ public:
+  /// @param queries a square grid, row by row, at places 0, stride, 2·stride … 16; they must stay.
+  void place(std::span<const QueryWindow> queries, int stride, const PositionTolerance& tolerance,
+             const WindowScale& scale);
+
+  [[nodiscard]] std::size_t count() const { return count_; }
+  /// Those within the tolerance of one of the 289 places.
+  [[nodiscard]] std::span<const PlacedQuery> at(std::size_t position) const {
+    return std::span(queries_).subspan(first_[position], first_[position + 1] - first_[position]);
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::array<std::size_t, WindowGrid::positions + 1> first_{};
+  std::vector<PlacedQuery> queries_;
+};
+
 /// All windows of one object's views. Value type; const calls are thread-safe.
 class WindowStore {
  public:
@@ -57,11 +78,12 @@ class WindowStore {
   [[nodiscard]] const std::vector<std::int8_t>& values() const { return values_; }
   [[nodiscard]] std::size_t memory() const { return values_.size() + biases_.size() * sizeof(std::int32_t); }
 
-  /// For each view (rounded up to whole groups) the largest q·m − ½‖m‖² − ½·penalty over the windows within
-  /// the tolerance of (row, column), in steps of scale.product(). The squared distance is q.energy −
-  /// 2·score·scale.product(). Places of a last group that are no views get a score far below every real one.
-  void best_scores(const QueryWindow& query, int row, int column, const PositionTolerance& tolerance,
-                   const WindowScale& scale, std::int32_t* scores) const;
+  /// For each query and each view (rounded up to whole groups) the largest q·m − ½‖m‖² − ½·penalty over the
+  /// windows within the tolerance of the query's place, in steps of scale.product(). The squared distance is
+  /// q.energy − 2·score·scale.product(). Places of a last group that are no views get a score far below every
+  /// real one.
+  /// @param scores [queries][groups × 8]
+  void best_scores(const PlacedQueries& queries, std::int32_t* scores) const;
 
  private:
   [[nodiscard]] std::size_t value_index(std::size_t position, std::size_t view, std::size_t dimension) const;
