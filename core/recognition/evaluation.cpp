@@ -20,12 +20,6 @@ namespace {
 
 constexpr double gross_error = 45.0;
 
-/// One view to be recognised.
-struct Test {
-  std::size_t set = 0;
-  std::size_t view = 0;
-};
-
 /// What came of it.
 struct Answer {
   std::string said;  ///< empty: nothing found
@@ -118,8 +112,8 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
 
 /// Shows every test view to a model without its object.
 void show_strangers(const std::shared_ptr<const Model>& model, std::span<const ImageSet> sets,
-                    std::span<const Test> tests, const EvaluationOptions& options, EvaluationReport& report,
-                    const Progress& progress, const std::stop_token& stop) {
+                    std::span<const SetView> tests, const EvaluationOptions& options,
+                    EvaluationReport& report, const Progress& progress, const std::stop_token& stop) {
   if (sets.size() < 2)
     throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
   std::vector<std::size_t> accepted(sets.size(), 0);
@@ -138,6 +132,28 @@ void show_strangers(const std::shared_ptr<const Model>& model, std::span<const I
   });
   report.strangers = std::accumulate(shown.begin(), shown.end(), std::size_t{0});
   report.false_accepts = std::accumulate(accepted.begin(), accepted.end(), std::size_t{0});
+}
+
+SceneReport show_scenes(const std::shared_ptr<const Model>& model, std::span<const ImageSet> sets,
+                        std::span<const SetView> tests, const EvaluationOptions& options,
+                        const Progress& progress, const std::stop_token& stop) {
+  SceneReport report;
+  std::mutex mutex;  // guards report and progress
+  const unsigned threads = resolved_threads(options.threads);
+  parallel_for(threads, threads, [&](std::size_t t) {
+    SceneComposer composer(sets, tests, options.scenes, model->normalization.segmentation);
+    Recognizer recognizer(model, options.recognizer);
+    for (std::size_t i = t; i < options.scenes.count; i += threads) {
+      if (stop.stop_requested()) throw Interrupted();
+      const ComposedScene scene = composer.compose(i);
+      if (scene.objects.empty()) continue;
+      const auto outcomes = recognizer.recognize(scene.picture);
+      const std::lock_guard lock(mutex);
+      count_scene(scene, sets, outcomes, report);
+      if (progress) progress({"composing scenes", report.scenes, options.scenes.count});
+    }
+  });
+  return report;
 }
 
 }  // namespace
@@ -213,7 +229,7 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
                           const Progress& progress, std::stop_token stop) {
   EvaluationReport report;
   std::vector<TrainingSet> training;
-  std::vector<Test> tests;
+  std::vector<SetView> tests;
   for (std::size_t s = 0; s < sets.size(); ++s) {
     ViewSplit split = split_views(sets[s], options.learn_every, options.offset);
     for (const std::size_t view : split.tested) tests.push_back({s, view});
@@ -249,12 +265,11 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
     add(report.times, worker.spent);
     report.load_time += worker.load_time;
   }
-  if (model->parts) {
-    report.smallest_rate = model->parts->smallest_rate;
-  }
+  if (model->parts) report.smallest_rate = model->parts->smallest_rate;
   for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->memory(o);
   report.model_bytes /= model->objects.size();
   if (options.leave_one_out) show_strangers(model, sets, tests, options, report, progress, stop);
+  if (options.scenes.count > 0) report.scenes = show_scenes(model, sets, tests, options, progress, stop);
   return report;
 }
 

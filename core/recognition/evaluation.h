@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/image/image_set.h"
+#include "core/recognition/composed_scenes.h"
 #include "core/recognition/learning.h"
 #include "core/recognition/recognizer.h"
 
@@ -44,6 +45,8 @@ struct EvaluationOptions {
   /// object is taken out of the learned model, and its views out of what thresholds are set from; eigenspaces
   /// stay as learned with all.
   bool leave_one_out = false;
+  /// Also show scenes composed of test views.
+  SceneOptions scenes;
   unsigned threads = 0;
 };
 
@@ -73,8 +76,9 @@ struct EvaluationReport {
   std::size_t ambiguous = 0;
   std::size_t strangers = 0;      ///< views shown to models without their object
   std::size_t false_accepts = 0;  ///< of these, taken for another object
-  double smallest_rate = 1.0;     ///< of wrong rejections, that the learned views can support
-  std::size_t model_bytes = 0;    ///< Model::memory, mean of an object
+  std::optional<SceneReport> scenes;
+  double smallest_rate = 1.0;   ///< of wrong rejections, that the learned views can support
+  std::size_t model_bytes = 0;  ///< Model::memory, mean of an object
 
   /// 0…1
   [[nodiscard]] double recognition_rate() const;

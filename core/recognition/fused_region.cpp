@@ -15,10 +15,17 @@ constexpr double same_extent = 0.12;
 constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are told apart less finely
 /// An object may reach beyond what is seen of it by this share of its side: so much may be covered.
 constexpr double most_beyond = 0.35;
+/// A box of another size than the object's costs it votes: so many of those its own views get, or more.
+constexpr double least_trial_votes = 0.8;
 constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
+constexpr double place_step = 0.2;      ///< between boxes away from the corners, in their sides
+constexpr double least_filled = 0.5;    ///< of a box away from the corners: foreground
+constexpr double same_place = 0.7;      ///< of two boxes' union
+constexpr int most_looks = 3000;        ///< at boxes; a region that asks for more stays in one piece
 constexpr std::size_t most_first = 3;   ///< of them, those that are followed to the end
-constexpr std::size_t most_objects = 4;
-constexpr double least_remainder = 0.12;  ///< of the region's pixels: less is outline
+constexpr std::size_t most_objects = 6;
+/// A remaining piece of this share of the smallest learned box, or more, may be an object; less is outline.
+constexpr double least_piece = 0.2;
 constexpr double least_explained = 0.85;
 constexpr double plainly_explained = 0.97;  ///< no other first object is tried
 /// What others leave in an object's picture costs evidence while they are being found, and some of it even
@@ -27,6 +34,8 @@ constexpr double search_slack = 3.0;
 constexpr double most_overlapped = 0.25;  ///< of an object, in the end; strangers leave more unexplained
 constexpr double most_left_over = 0.1;    ///< what is covered by more than this gets no slack in the end
 constexpr double final_slack = 1.5;
+/// A known object that is so much larger than it was learned may be two.
+constexpr double doubtful_size = 1.3;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
 
 cv::Mat foreground_of(const cv::Mat& cut, const Background& background) {
@@ -44,6 +53,15 @@ cv::Mat foreground_of(const cv::Mat& cut, const Background& background) {
   return mask;
 }
 
+/// Whether enough of a box is foreground for an object. @param sums integral of a foreground.
+bool filled(const cv::Rect& box, const cv::Mat& sums) {
+  const cv::Rect inside = box & cv::Rect(0, 0, sums.cols - 1, sums.rows - 1);
+  const auto at = [&](int x, int y) { return sums.at<int>(y, x); };
+  const int sum = at(inside.br().x, inside.br().y) - at(inside.x, inside.br().y) -
+                  at(inside.br().x, inside.y) + at(inside.x, inside.y);
+  return sum >= 255.0 * least_filled * box.area();
+}
+
 /// The learned view nearest to a pose, in the order of the grid.
 std::size_t nearest_view(const PoseSpace& space, std::span<const double> q) {
   const auto axes = space.coarse_manifold().axes();
@@ -56,21 +74,45 @@ std::size_t nearest_view(const PoseSpace& space, std::span<const double> q) {
   return view;
 }
 
-/// The box of the largest piece, and how many pixels all pieces have.
-cv::Rect largest_piece(const cv::Mat& mask, int& area) {
+/// What a mask is made of.
+struct Piece {
+  cv::Rect box;     ///< of the largest piece
+  double area = 0;  ///< its pixels
+  double all = 0;   ///< those of all pieces
+};
+
+Piece largest_piece(const cv::Mat& mask) {
   cv::Mat labels;
   cv::Mat stats;
   cv::Mat centres;
   const int count = cv::connectedComponentsWithStats(mask, labels, stats, centres);
-  area = 0;
-  int best = 0;
+  Piece largest;
   for (int i = 1; i < count; ++i) {
-    area += stats.at<int>(i, cv::CC_STAT_AREA);
-    if (best == 0 || stats.at<int>(i, cv::CC_STAT_AREA) > stats.at<int>(best, cv::CC_STAT_AREA)) best = i;
+    const int area = stats.at<int>(i, cv::CC_STAT_AREA);
+    largest.all += area;
+    if (area <= largest.area) continue;
+    largest.area = area;
+    largest.box = {stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
+                   stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT)};
   }
-  if (best == 0) return {};
-  return {stats.at<int>(best, cv::CC_STAT_LEFT), stats.at<int>(best, cv::CC_STAT_TOP),
-          stats.at<int>(best, cv::CC_STAT_WIDTH), stats.at<int>(best, cv::CC_STAT_HEIGHT)};
+  return largest;
+}
+
+double shared(const cv::Rect& a, const cv::Rect& b) {
+  const double both = (a & b).area();
+  return both / (a.area() + b.area() - both);
+}
+
+/// Of those that are the same object in about the same place, the first.
+void keep_different(std::vector<FusedObject>& objects) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const auto again = [&](const FusedObject& other) {
+      return other.found.best.object == objects[i].found.best.object &&
+             shared(other.box, objects[i].box) > same_place;
+    };
+    objects.erase(std::remove_if(objects.begin() + static_cast<std::ptrdiff_t>(i) + 1, objects.end(), again),
+                  objects.end());
+  }
 }
 
 }  // namespace
@@ -116,7 +158,8 @@ bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
   crop_.create(box.size(), work_.type());
   crop_.setTo(background_.color());
   const cv::Rect inside = box & cv::Rect(0, 0, work_.cols, work_.rows);
-  if (inside.empty()) return false;
+  if (inside.empty() || looks_left_ == 0) return false;
+  --looks_left_;
   work_(inside).copyTo(crop_(inside - box.tl()));
   picture.resize(picture_length(normalization_));
   if (!(normalizer_.normalize(crop_, background_.level, picture) > 0.0F)) return false;
@@ -125,25 +168,45 @@ bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
   return true;
 }
 
-std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline, double visible) {
+cv::Size FusedRegion::learned_size(std::size_t object, std::span<const double> q) const {
+  return parts_.extents[object][nearest_view(parts_.poses[object], q)];
+}
+
+bool FusedRegion::too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const {
+  if (extents_.empty()) return false;
+  const cv::Size learned = learned_size(object, q);
+  return !learned.empty() &&
+         (region.width > doubtful_size * learned.width || region.height > doubtful_size * learned.height);
+}
+
+std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline, double visible, Places places) {
   std::vector<Trial> all;
   std::vector<float> picture;
+  cv::Mat sums;
+  if (places == Places::all) cv::integral(foreground_of(work_, background_), sums, CV_32S);
   for (std::size_t e = 0; e < extents_.size(); ++e) {
     const cv::Size& size = extents_[e].size;
     if ((1.0 - most_beyond) * size.width > outline.width ||
         (1.0 - most_beyond) * size.height > outline.height)
       continue;
-    for (const bool right : {false, true}) {
-      for (const bool bottom : {false, true}) {
-        const cv::Rect box({right ? outline.br().x - size.width : outline.x,
-                            bottom ? outline.br().y - size.height : outline.y},
-                           size);
+    const cv::Size room(outline.width - size.width, outline.height - size.height);
+    const auto steps = [&](int free, int side) {
+      return places == Places::corners ? 1
+                                       : std::max(1, static_cast<int>(std::ceil(free / (place_step * side))));
+    };
+    const int across = steps(room.width, size.width);
+    const int down = steps(room.height, size.height);
+    for (int i = 0; i <= across; ++i) {
+      for (int k = 0; k <= down; ++k) {
+        const cv::Rect box({outline.x + room.width * i / across, outline.y + room.height * k / down}, size);
+        const bool corner = (i == 0 || i == across) && (k == 0 || k == down);
+        if (places == Places::all && (corner || !filled(box, sums))) continue;  // corners have been looked at
         if (!look(box, picture)) continue;
         const auto votes = recognizer_.vote(extents_[e].objects);
         const std::size_t object = votes[0].object;
         const double share = recognizer_.share_of(object);
-        if (share >= visible * (1.0 - parts_.calibration[object].rejection_score))
-          all.push_back({box, e, share});
+        const double own = 1.0 - parts_.calibration[object].rejection_score;
+        if (share >= least_trial_votes * visible * own) all.push_back({box, e, share});
       }
     }
   }
@@ -159,9 +222,8 @@ FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t
   if (!look(box, object.picture)) return object;
   object.found = recognizer_.identify(shortlist, true);
   const PartsPose& pose = object.found.best.poses.front();
-  const std::vector<cv::Size>& extents = parts_.extents[object.found.best.object];
-  // The size of the learned view nearest in pose, about the middle that alignment found.
-  const cv::Size learned = extents[nearest_view(parts_.poses[object.found.best.object], pose.q)];
+  // The size of the learned view, about the middle that alignment found.
+  const cv::Size learned = learned_size(object.found.best.object, pose.q);
   const cv::Size size = learned.empty() ? box.size() : learned;
   const double side = std::max(box.width, box.height);
   const double x = box.x + 0.5 * box.width + side * pose.misalignment.dx;
@@ -173,8 +235,16 @@ FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t
 }
 
 std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double visible) {
+  for (const Places places : {Places::corners, Places::all}) {
+    std::vector<FusedObject> found = candidates(trials(outline, visible, places));
+    if (!found.empty()) return found;
+  }
+  return {};
+}
+
+std::vector<FusedObject> FusedRegion::candidates(std::span<const Trial> trials) {
   std::vector<FusedObject> found;
-  for (const Trial& trial : trials(outline, visible)) {
+  for (const Trial& trial : trials) {
     FusedObject object = settle(trial.box, extents_[trial.extent].objects);
     if (!object.found.best.poses.empty()) found.push_back(std::move(object));
   }
@@ -182,6 +252,7 @@ std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double
     return a.found.evidence > b.found.evidence;
   };
   std::ranges::sort(found, by_evidence);
+  keep_different(found);
   found.resize(std::min(found.size(), most_first));
   // Again in the box that alignment set right, where there is less to be aligned.
   for (FusedObject& object : found) {
@@ -193,6 +264,7 @@ std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double
     return !(object.found.evidence > parts_.covered_evidence - search_slack);
   });
   std::ranges::sort(found, by_evidence);
+  keep_different(found);
   return found;
 }
 
@@ -215,72 +287,74 @@ cv::Mat FusedRegion::silhouette(const FusedObject& object) const {
   return out;
 }
 
-double FusedRegion::complete(FusedObject first, const cv::Mat& foreground,
-                             std::vector<FusedObject>& objects) {
+double FusedRegion::complete(FusedObject first, const cv::Mat& foreground, TakenApart& way) {
   const double whole = cv::countNonZero(foreground);
-  cv::Mat rest = foreground.clone();
-  objects.clear();
-  objects.push_back(std::move(first));
+  cv::Mat left = foreground.clone();
+  way.objects.clear();
+  way.objects.push_back(std::move(first));
   while (true) {
-    const cv::Mat taken = silhouette(objects.back());
-    rest.setTo(0, taken);
+    const cv::Mat taken = silhouette(way.objects.back());
+    left.setTo(0, taken);
     work_.setTo(background_.color(), taken);
     cv::Mat pieces;
-    cv::morphologyEx(rest, pieces, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
-    int area = 0;
-    const cv::Rect outline = largest_piece(pieces, area);
-    if (area < least_remainder * whole || objects.size() == most_objects) return 1.0 - area / whole;
-    std::vector<FusedObject> next = candidates(outline, 1.0 - most_overlapped);
-    if (next.empty()) return 1.0 - area / whole;
-    objects.push_back(std::move(next.front()));
+    cv::morphologyEx(left, pieces, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+    const Piece piece = largest_piece(pieces);
+    const double explained = 1.0 - piece.all / whole;
+    way.rest = piece.area < least_piece * least_.area() ? cv::Rect() : piece.box;
+    if (way.rest.empty() || way.objects.size() == most_objects) return explained;
+    std::vector<FusedObject> next = candidates(piece.box, 1.0 - most_overlapped);
+    if (next.empty()) return explained;
+    way.objects.push_back(std::move(next.front()));
   }
 }
 
-const std::vector<FusedObject>& FusedRegion::take_apart(const cv::Mat& cut, const Background& background) {
+const TakenApart& FusedRegion::take_apart(const cv::Mat& cut, const Background& background) {
   background_ = background;
-  objects_.clear();
+  looks_left_ = most_looks;
+  result_ = {};
+  if (!possible(cut.size())) return result_;
+  std::vector<FusedObject>& objects = result_.objects;
   cut.copyTo(work_);
   const cv::Mat foreground = foreground_of(cut, background);
-  int area = 0;
-  const cv::Rect outline = largest_piece(foreground, area);
-  if (area == 0) return objects_;
+  const cv::Rect outline = largest_piece(foreground).box;
+  if (outline.empty()) return result_;
   // Of objects that overlap, one stands before the others and shows itself whole.
   const std::vector<FusedObject> first = candidates(outline, 1.0);
   double most = 0.0;
-  std::vector<FusedObject> objects;
+  TakenApart way;
   for (const FusedObject& begun : first) {
     cut.copyTo(work_);
-    const double explained = complete(begun, foreground, objects);
-    if (objects.size() > 1 && explained > std::max(most, least_explained)) {
+    const double explained = complete(begun, foreground, way);
+    if (way.objects.size() > 1 && explained > std::max(most, least_explained)) {
       most = explained;
-      objects_ = objects;
+      result_ = way;
     }
     if (most > plainly_explained) break;
   }
   // Each once more, without the others in its picture.
-  for (std::size_t i = 0; i < objects_.size(); ++i) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
     cut.copyTo(work_);
-    const cv::Mat own = silhouette(objects_[i]);
-    for (std::size_t k = 0; k < objects_.size(); ++k) {
+    const cv::Mat own = silhouette(objects[i]);
+    for (std::size_t k = 0; k < objects.size(); ++k) {
       if (k == i) continue;
-      cv::Mat other = silhouette(objects_[k]);
+      cv::Mat other = silhouette(objects[k]);
       other.setTo(0, own);
       work_.setTo(background_.color(), other);
     }
-    FusedObject again = settle(objects_[i].box, std::span(&objects_[i].found.best.object, 1));
+    FusedObject again = settle(objects[i].box, std::span(&objects[i].found.best.object, 1));
     if (again.found.best.poses.empty()) continue;
-    again.found.second = std::move(objects_[i].found.second);
-    again.found.second_share = objects_[i].found.second_share;
-    again.found.tie = objects_[i].found.tie;
-    objects_[i] = std::move(again);
+    again.found.second = std::move(objects[i].found.second);
+    again.found.second_share = objects[i].found.second_share;
+    again.found.tie = objects[i].found.tie;
+    objects[i] = std::move(again);
   }
-  const bool sure = std::ranges::all_of(objects_, [&](const FusedObject& object) {
+  const bool sure = std::ranges::all_of(objects, [&](const FusedObject& object) {
     const bool free = object.found.best.covered <= most_left_over;
     return object.found.best.covered <= most_overlapped &&
            object.found.evidence > parts_.covered_evidence - (free ? final_slack : 0.0);
   });
-  if (!sure) objects_.clear();
-  return objects_;
+  if (!sure) result_ = {};
+  return result_;
 }
 
 }  // namespace eigenpose

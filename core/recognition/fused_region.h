@@ -25,6 +25,13 @@ struct FusedObject {
   PartsIdentification found;
 };
 
+/// What a fused region shows.
+struct TakenApart {
+  std::vector<FusedObject> objects;  ///< two or more; none when that cannot be said
+  cv::Rect
+      rest;  ///< in the cut-out, of the largest piece left over that may be an object; empty where none is
+};
+
 /// Takes fused regions apart. Holds scratch memory: one thread at a time.
 class FusedRegion {
  public:
@@ -32,11 +39,10 @@ class FusedRegion {
   FusedRegion(const NormalizationOptions& normalization, const PartsModel& parts,
               PartsRecognizer& recognizer);
 
-  /// A region as large as this may be two objects.
-  [[nodiscard]] bool possible(const cv::Size& region) const;
-  /// The objects that make up the region, two or more; none when that cannot be said.
-  /// @param cut the region's pixels, in its box. Valid until the next call.
-  const std::vector<FusedObject>& take_apart(const cv::Mat& cut, const Background& background);
+  /// An object in this pose was learned so much smaller that the region may show another beside it.
+  [[nodiscard]] bool too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const;
+  /// @param cut the region's pixels, in its box. @return what is valid until the next call.
+  const TakenApart& take_apart(const cv::Mat& cut, const Background& background);
 
  private:
   /// Learned views of about the same size.
@@ -52,19 +58,27 @@ class FusedRegion {
   };
 
   void group_extents(double same);
+  /// A region as large as this may be two objects.
+  [[nodiscard]] bool possible(const cv::Size& region) const;
   /// Makes the picture of a box of `work_`, and shows it to the recogniser. False where it is black.
   bool look(const cv::Rect& box, std::vector<float>& picture);
-  /// Boxes in the corners of `outline`, most promising first.
+  enum class Places { corners, all };
+  /// Boxes in the corners of `outline`, or all over it, most promising first.
   /// @param visible share of an object's votes that it must get.
-  std::vector<Trial> trials(const cv::Rect& outline, double visible);
+  std::vector<Trial> trials(const cv::Rect& outline, double visible, Places places);
+  /// The size of the learned view nearest to a pose; empty where the object came ready-cut.
+  [[nodiscard]] cv::Size learned_size(std::size_t object, std::span<const double> q) const;
   /// The object in a box, its box set right by what alignment found.
   FusedObject settle(const cv::Rect& box, std::span<const std::size_t> shortlist);
-  /// What may stand in a corner of `outline` and is sure enough, surest first. @param visible as in trials.
+  /// What may stand in `outline` and is sure enough, surest first; where no corner holds anything, away from
+  /// them. @param visible as in trials.
   std::vector<FusedObject> candidates(const cv::Rect& outline, double visible);
+  /// Of these boxes.
+  std::vector<FusedObject> candidates(std::span<const Trial> trials);
   /// The foreground pixels that an object takes up.
   cv::Mat silhouette(const FusedObject& object) const;
   /// Follows one first object until nothing remains. Returns the share of the region that is explained.
-  double complete(FusedObject first, const cv::Mat& foreground, std::vector<FusedObject>& objects);
+  double complete(FusedObject first, const cv::Mat& foreground, TakenApart& way);
 
   const NormalizationOptions& normalization_;
   const PartsModel& parts_;
@@ -75,8 +89,9 @@ class FusedRegion {
   Background background_;
   cv::Mat work_;  ///< the cut-out without the objects that were found
   cv::Mat crop_;
-  cv::Mat picture_;  ///< bytes of the box looked at
-  std::vector<FusedObject> objects_;
+  cv::Mat picture_;     ///< bytes of the box looked at
+  int looks_left_ = 0;  ///< so that no region takes for ever
+  TakenApart result_;
 };
 
 }  // namespace eigenpose

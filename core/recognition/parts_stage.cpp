@@ -53,10 +53,10 @@ bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<
   return false;
 }
 
-void PartsStage::judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome) {
+std::size_t PartsStage::judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome) {
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   recognizer_.look(picture_);
-  if (!settle(picture, nearest, outcome)) vote(picture, outcome);
+  return settle(picture, nearest, outcome) ? nearest : vote(picture, outcome);
 }
 
 bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outcome& outcome) {
@@ -98,7 +98,7 @@ RealignedDistance PartsStage::distance_of(std::span<const float> picture, const 
   return match_.distance(picture, answer.poses.front().misalignment, answer.object);
 }
 
-void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
+std::size_t PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
   PartsIdentification found = recognizer_.identify();
   RealignedDistance distance = distance_of(picture, found.best);
   if (found.tie && found.best.covered <= model_.parts->calibration[found.best.object].covered_share) {
@@ -112,11 +112,7 @@ void PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
         is_ambiguous(likelihood(second.own, distance.own, model_.typical_distance(found.best.object)));
   }
   describe(found, distance, accepted(found, distance), picture, outcome);
-}
-
-std::span<const FusedObject> PartsStage::take_apart(const cv::Mat& cut, const Background& background) {
-  if (!fused_.possible(cut.size())) return {};
-  return fused_.take_apart(cut, background);
+  return found.best.object;
 }
 
 void PartsStage::describe(const FusedObject& object, Outcome& outcome) {

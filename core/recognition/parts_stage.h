@@ -29,10 +29,17 @@ class PartsStage {
 
   /// Fills everything of `outcome` but its box.
   /// @param picture as the normaliser makes it. @param nearest the object whose manifold is nearest.
-  void judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome);
-  /// A region that `judge` did not know: the objects that make it up, where they touch or overlap. None when
-  /// that cannot be said. @param cut the region's pixels. Valid until the next call.
-  std::span<const FusedObject> take_apart(const cv::Mat& cut, const Background& background);
+  /// @return the object of outcome.best.
+  std::size_t judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome);
+  /// A region judged to show `object` that is larger than the object was learned: it may show more.
+  [[nodiscard]] bool too_large(const cv::Size& region, std::size_t object, const Outcome& outcome) const {
+    return fused_.too_large(region, object, outcome.best->q);
+  }
+  /// Of a region that `judge` did not know, or that is too large: the objects that make it up, where they
+  /// touch or overlap. @param cut the region's pixels. @return what is valid until the next call.
+  const TakenApart& take_apart(const cv::Mat& cut, const Background& background) {
+    return fused_.take_apart(cut, background);
+  }
   /// Fills everything of `outcome` but its box.
   void describe(const FusedObject& object, Outcome& outcome);
 
@@ -49,7 +56,8 @@ class PartsStage {
 
   /// The whole region alone. True when it left no doubt, and `outcome` is filled.
   bool settle(std::span<const float> picture, std::size_t object, Outcome& outcome);
-  void vote(std::span<const float> picture, Outcome& outcome);
+  /// Its windows as well. @return the object.
+  std::size_t vote(std::span<const float> picture, Outcome& outcome);
   void describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
                 std::span<const float> picture, Outcome& outcome);
   void describe(const Finding& finding, bool accepted, Outcome& outcome) const;

@@ -226,15 +226,16 @@ void Recognizer::Impl::judge(Outcome& outcome) {
 
 void Recognizer::Impl::take_apart(const cv::Mat& image, std::size_t region) {
   if (model->normalization.cropped) return;
-  const auto found = parts->take_apart(segmenter.cut_out(image, region), segmenter.background());
-  if (found.empty()) return;
+  const TakenApart& found = parts->take_apart(segmenter.cut_out(image, region), segmenter.background());
+  if (found.objects.empty()) return;
   const cv::Rect frame(0, 0, image.cols, image.rows);
   const cv::Point corner = outcomes[--outcome_count].box.tl();
-  for (const FusedObject& object : found) {
+  for (const FusedObject& object : found.objects) {
     Outcome& outcome = next_outcome();
     outcome.box = (object.box + corner) & frame;
     parts->describe(object, outcome);
   }
+  if (!found.rest.empty()) next_outcome().box = found.rest + corner;  // unknown
 }
 
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
@@ -335,8 +336,9 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
       const Lap lap(spent.search);
       impl.find_closest();
       if (impl.parts) {
-        impl.parts->judge(impl.picture(), impl.closest[0].manifold, outcome);
-        if (outcome.verdict == Verdict::unknown) impl.take_apart(image, i);
+        const std::size_t object = impl.parts->judge(impl.picture(), impl.closest[0].manifold, outcome);
+        if (outcome.verdict == Verdict::unknown || impl.parts->too_large(outcome.box.size(), object, outcome))
+          impl.take_apart(image, i);
       } else {
         impl.look_again();
         impl.judge(outcome);

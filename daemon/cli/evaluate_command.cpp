@@ -1,5 +1,6 @@
 /// `eigenpose evaluate`: how well objects are told apart, measured on views that were not learned.
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -31,7 +32,9 @@ Examples:
   eigenpose evaluate sets/coil-100 --learn-every 4 --color --json > result.json
   eigenpose evaluate sets/coil-20 --objects obj1,obj5
   eigenpose evaluate sets/coil-20 --perturb shift=2,scale=0.03,rotation=3 --seed 7
-  eigenpose evaluate sets/coil-20 --occlude 0.2 --leave-one-out)";
+  eigenpose evaluate sets/coil-20 --occlude 0.2 --leave-one-out
+  eigenpose evaluate sets/table --scenes 200                (several objects in one picture, apart)
+  eigenpose evaluate sets/table --scenes 200 --overlap 0.2  (touching, or covering one another a little))";
 
 struct EvaluateOptions {
   std::string sets;
@@ -43,6 +46,7 @@ struct EvaluateOptions {
   double occlude = 0.0;
   unsigned seed = 1;
   bool leave_one_out = false;
+  SceneOptions scenes;
   double rejection_rate = 0.001;
   bool as_json = false;
 };
@@ -53,6 +57,20 @@ double milliseconds(Duration duration) {
 
 double micro_per_view(Duration duration, std::size_t views) {
   return 1e3 * milliseconds(duration) / static_cast<double>(views);
+}
+
+json scenes_json(const SceneReport& scenes) {
+  const auto pose = summarize_errors(scenes.pose_errors);
+  const auto n = static_cast<double>(std::max<std::size_t>(scenes.objects, 1));
+  return {{"scenes", scenes.scenes},
+          {"objects", scenes.objects},
+          {"found_rate", static_cast<double>(scenes.found) / n},
+          {"right_rate", static_cast<double>(scenes.right) / n},
+          {"recognized_rate", static_cast<double>(scenes.recognized) / n},
+          {"extra_boxes", scenes.extra},
+          {"pose_error_mean_deg", pose.mean},
+          {"pose_error_median_deg", pose.median},
+          {"pose_gross_rate", pose.gross_rate}};
 }
 
 json to_json(const EvaluationReport& report) {
@@ -89,6 +107,7 @@ json to_json(const EvaluationReport& report) {
           {"false_accept_rate", report.strangers == 0 ? json(nullptr)
                                                       : json(static_cast<double>(report.false_accepts) /
                                                              static_cast<double>(report.strangers))},
+          {"scenes", report.scenes ? scenes_json(*report.scenes) : json(nullptr)},
           {"smallest_rejection_rate", report.smallest_rate},
           {"model_bytes_per_object", report.model_bytes},
           {"learned_views", report.learning.views},
@@ -138,6 +157,20 @@ void print(const EvaluationReport& report) {
     std::printf("strangers   %.2f %% of %zu views of objects left out were taken for another\n",
                 100.0 * static_cast<double>(report.false_accepts) / static_cast<double>(report.strangers),
                 report.strangers);
+  if (report.scenes) {
+    const SceneReport& scenes = *report.scenes;
+    const auto errors = summarize_errors(scenes.pose_errors);
+    const auto of_all = [&](std::size_t count) {
+      return 100.0 * static_cast<double>(count) /
+             static_cast<double>(std::max<std::size_t>(scenes.objects, 1));
+    };
+    std::printf(
+        "scenes      %zu with %zu objects: %.2f %% found, %.2f %% the right object, %.2f %% recognised; %zu "
+        "boxes of nothing\n"
+        "            pose error mean %.2f°, median %.2f°\n",
+        scenes.scenes, scenes.objects, of_all(scenes.found), of_all(scenes.right), of_all(scenes.recognized),
+        scenes.extra, errors.mean, errors.median);
+  }
   std::printf("eigenspace  %zu dimensions by %s, %.1f %% of the scatter\n", report.learning.solver.components,
               report.learning.solver.solver.c_str(), 100.0 * report.learning.solver.energy);
   std::printf("learning    %.0f ms: normalise %.0f, eigenspace %.0f, manifolds %.0f, rejection %.0f\n",
@@ -187,6 +220,11 @@ int run_evaluate(const EvaluateOptions& options, const std::stop_token& stop) {
   evaluation.recognizer = options.recognizer;
   evaluation.damage = parse_damage(options);
   evaluation.leave_one_out = options.leave_one_out;
+  if (options.scenes.overlap && options.scenes.count == 0)
+    throw ConfigError(
+        "--overlap says how objects of --scenes stand; say how many scenes, as in --scenes 200");
+  evaluation.scenes = options.scenes;
+  evaluation.scenes.seed = options.seed;
   evaluation.learning.calibration.rate = options.rejection_rate;
   evaluation.learning.match.rate = options.rejection_rate;
   ConsoleProgress progress;
@@ -220,9 +258,20 @@ void add_evaluate_command(CLI::App& app, CommandLine& line) {
       ->delimiter(',');
   command->add_option("--occlude", options->occlude, "Cover this share of test pictures with a black square")
       ->check(CLI::Range(0.0, 0.9));
-  command->add_option("--seed", options->seed, "Seed of --perturb and --occlude")->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of --perturb, --occlude and --scenes")
+      ->capture_default_str();
   command->add_flag("--leave-one-out", options->leave_one_out,
                     "Also show each object to a model without it: strangers");
+  command
+      ->add_option("--scenes", options->scenes.count,
+                   "Also show so many scenes composed of test views, 2 to 4 objects each")
+      ->check(CLI::Range(0, 1000000));
+  command
+      ->add_option(
+          "--overlap", options->scenes.overlap,
+          "Objects of a scene touch, and cover up to this share of each other; without it they stand "
+          "apart")
+      ->check(CLI::Range(0.0, 0.9));
   command
       ->add_option("--rejection-rate", options->rejection_rate,
                    "Share of known regions that may be called unknown (0…0.5)")
