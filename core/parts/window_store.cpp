@@ -70,7 +70,7 @@ void WindowStore::make_biases(const WindowScale& scale) {
       std::int32_t sum = 0;
       std::int32_t energy = 0;
       for (std::size_t k = 0; k < dims; ++k) {
-        const std::int32_t step = values_[value_index(p, v, k)];
+        const auto step = values_[value_index(p, v, k)];
         sum += step;
         energy += step * step;
       }
