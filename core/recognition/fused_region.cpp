@@ -19,7 +19,7 @@ constexpr double most_beyond = 0.35;
 constexpr double least_trial_votes = 0.8;
 constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
 constexpr double place_step = 0.2;      ///< between boxes away from the corners, in their sides
-constexpr double least_filled = 0.5;    ///< of a box away from the corners: foreground
+constexpr double least_filled = 0.6;    ///< of a box away from the corners: foreground
 constexpr double same_place = 0.7;      ///< of two boxes' union
 constexpr int most_looks = 3000;        ///< at boxes; a region that asks for more stays in one piece
 constexpr std::size_t most_first = 3;   ///< of them, those that are followed to the end
@@ -34,6 +34,7 @@ constexpr double search_slack = 3.0;
 constexpr double most_overlapped = 0.25;  ///< of an object, in the end; strangers leave more unexplained
 constexpr double most_left_over = 0.1;    ///< what is covered by more than this gets no slack in the end
 constexpr double final_slack = 1.5;
+constexpr double beyond_doubt = 1.5;  ///< evidence more than is asked for
 /// A known object that is so much larger than it was learned may be two.
 constexpr double doubtful_size = 1.3;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
@@ -300,8 +301,10 @@ double FusedRegion::complete(FusedObject first, const cv::Mat& foreground, Taken
     cv::morphologyEx(left, pieces, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
     const Piece piece = largest_piece(pieces);
     const double explained = 1.0 - piece.all / whole;
-    way.rest = piece.area < least_piece * least_.area() ? cv::Rect() : piece.box;
-    if (way.rest.empty() || way.objects.size() == most_objects) return explained;
+    way.unknown.clear();
+    if (piece.area < least_piece * least_.area()) return explained;
+    way.unknown.push_back(piece.box);
+    if (way.objects.size() == most_objects) return explained;
     std::vector<FusedObject> next = candidates(piece.box, 1.0 - most_overlapped);
     if (next.empty()) return explained;
     way.objects.push_back(std::move(next.front()));
@@ -325,7 +328,7 @@ const TakenApart& FusedRegion::take_apart(const cv::Mat& cut, const Background& 
   for (const FusedObject& begun : first) {
     cut.copyTo(work_);
     const double explained = complete(begun, foreground, way);
-    if (way.objects.size() > 1 && explained > std::max(most, least_explained)) {
+    if (explained > most) {
       most = explained;
       result_ = way;
     }
@@ -348,12 +351,22 @@ const TakenApart& FusedRegion::take_apart(const cv::Mat& cut, const Background& 
     again.found.tie = objects[i].found.tie;
     objects[i] = std::move(again);
   }
-  const bool sure = std::ranges::all_of(objects, [&](const FusedObject& object) {
-    const bool free = object.found.best.covered <= most_left_over;
+  const auto sure = [&](const FusedObject& object, double slack) {
     return object.found.best.covered <= most_overlapped &&
-           object.found.evidence > parts_.covered_evidence - (free ? final_slack : 0.0);
+           object.found.evidence > parts_.covered_evidence - slack;
+  };
+  const bool all = objects.size() > 1 && most > least_explained &&
+                   std::ranges::all_of(objects, [&](const FusedObject& object) {
+                     return sure(object, object.found.best.covered <= most_left_over ? final_slack : 0.0);
+                   });
+  if (all) return result_;
+  // What is beyond doubt is told even beside something that is not known.
+  std::erase_if(objects, [&](const FusedObject& object) {
+    if (sure(object, -beyond_doubt)) return false;
+    result_.unknown.push_back(object.box);
+    return true;
   });
-  if (!sure) result_ = {};
+  if (objects.empty() || result_.unknown.empty()) result_ = {};
   return result_;
 }
 

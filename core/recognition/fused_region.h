@@ -27,9 +27,9 @@ struct FusedObject {
 
 /// What a fused region shows.
 struct TakenApart {
-  std::vector<FusedObject> objects;  ///< two or more; none when that cannot be said
-  cv::Rect
-      rest;  ///< in the cut-out, of the largest piece left over that may be an object; empty where none is
+  std::vector<FusedObject> objects;  ///< none when it cannot be said
+  /// In the cut-out, where something else may stand that is not known.
+  std::vector<cv::Rect> unknown;
 };
 
 /// Takes fused regions apart. Holds scratch memory: one thread at a time.

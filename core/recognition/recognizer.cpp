@@ -235,7 +235,7 @@ void Recognizer::Impl::take_apart(const cv::Mat& image, std::size_t region) {
     outcome.box = (object.box + corner) & frame;
     parts->describe(object, outcome);
   }
-  if (!found.rest.empty()) next_outcome().box = found.rest + corner;  // unknown
+  for (const cv::Rect& box : found.unknown) next_outcome().box = (box + corner) & frame;
 }
 
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
