@@ -13,4 +13,10 @@ struct Region {
   bool touches_border = false;  ///< part of it may be outside the picture
 };
 
+/// Intersection over union of two boxes, 0…1.
+inline double shared_area(const cv::Rect& a, const cv::Rect& b) {
+  const double both = (a & b).area();
+  return both / (a.area() + b.area() - both);
+}
+
 }  // namespace eigenpose

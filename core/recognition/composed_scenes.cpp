@@ -7,6 +7,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/region.h"
+
 namespace eigenpose {
 namespace {
 
@@ -30,11 +32,6 @@ cv::Mat grown(const cv::Mat& mask, int border) {
   cv::copyMakeBorder(mask, out, border, border, border, border, cv::BORDER_CONSTANT, cv::Scalar::all(0));
   cv::dilate(out, out, cv::Mat::ones(2 * border + 1, 2 * border + 1, CV_8U));
   return out;
-}
-
-double shared(const cv::Rect& a, const cv::Rect& b) {
-  const double both = (a & b).area();
-  return both / (a.area() + b.area() - both);
 }
 
 }  // namespace
@@ -138,7 +135,7 @@ void count_scene(const ComposedScene& scene, std::span<const ImageSet> sets,
     std::optional<std::size_t> nearest;
     double most = least_union;
     for (std::size_t i = 0; i < outcomes.size(); ++i) {
-      const double share = shared(placed.box, outcomes[i].box);
+      const double share = shared_area(placed.box, outcomes[i].box);
       if (taken[i] || share < most) continue;
       most = share;
       nearest = i;

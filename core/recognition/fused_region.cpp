@@ -7,6 +7,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/region.h"
+
 namespace eigenpose {
 namespace {
 
@@ -99,17 +101,12 @@ Piece largest_piece(const cv::Mat& mask) {
   return largest;
 }
 
-double shared(const cv::Rect& a, const cv::Rect& b) {
-  const double both = (a & b).area();
-  return both / (a.area() + b.area() - both);
-}
-
 /// Of those that are the same object in about the same place, the first.
 void keep_different(std::vector<FusedObject>& objects) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const auto again = [&](const FusedObject& other) {
       return other.found.best.object == objects[i].found.best.object &&
-             shared(other.box, objects[i].box) > same_place;
+             shared_area(other.box, objects[i].box) > same_place;
     };
     objects.erase(std::remove_if(objects.begin() + static_cast<std::ptrdiff_t>(i) + 1, objects.end(), again),
                   objects.end());
