@@ -7,6 +7,7 @@
 
 #include <Eigen/LU>
 
+#include "core/manifold/pose_covariance.h"
 #include "core/parts/dense_kernels.h"
 
 namespace eigenpose {
@@ -132,7 +133,8 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
   end.fine_cost = best;
   const auto dofs = static_cast<std::size_t>(space.sample_poses().rows());
   end.q.resize(dofs);
-  end.q_sigma.assign(dofs, std::numeric_limits<double>::infinity());
+  end.q_covariance = unseen_pose(dofs);
+  const double variance = std::max(best, options_.noise) / static_cast<double>(projected_.rows());
   for (std::size_t a = 0; a < dofs; ++a) {
     const double q = space.sample_poses()(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(here));
     end.q[a] = q;
@@ -150,10 +152,18 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
       end.q[a] = dof.canonical(q + step * std::clamp(0.5 * (left - right) / curvature, -1.0, 1.0));
       // The cost is a squared distance whose expected value at the truth is D·variance; ½·curvature = 1/σ² ·
       // variance.
-      end.q_sigma[a] = step * std::sqrt(2.0 * std::max(best, options_.noise) /
-                                        (curvature * static_cast<double>(projected_.rows())));
+      end.q_covariance[a * dofs + a] = step * step * 2.0 * variance / curvature;
     }
   }
+  if (dofs > 1) relate(space, variance, end);
+}
+
+void PoseAligner::relate(const PoseSpace& space, double variance, AlignedPose& pose) const {
+  const Eigen::MatrixXd jacobian = space.coarse_manifold().evaluate_with_jacobian(pose.q).jacobian;
+  const Eigen::MatrixXd with_misalignment = projected_.rightCols(5).cast<double>().transpose() * jacobian;
+  set_covariance(
+      jacobian.transpose() * jacobian - with_misalignment.transpose() * inverse_ * with_misalignment,
+      variance, pose.q_covariance);
 }
 
 double PoseAligner::fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose) {

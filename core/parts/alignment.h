@@ -44,9 +44,9 @@ struct AlignmentOptions {
 struct AlignedPose {
   std::vector<double> q;
   Misalignment misalignment;
-  double cost = 0.0;            ///< squared distance after alignment plus νpᵀΛp, coarse scale
-  double fine_cost = 0.0;       ///< the same at the fine scale, where poses are compared there
-  std::vector<double> q_sigma;  ///< 1 σ of each DOF from the curvature of the cost
+  double cost = 0.0;                 ///< squared distance after alignment plus νpᵀΛp, coarse scale
+  double fine_cost = 0.0;            ///< the same at the fine scale, where poses are compared there
+  std::vector<double> q_covariance;  ///< m × m, row by row; infinite where a DOF cannot be seen
 };
 
 /// Aligns regions with pose spaces. Holds scratch memory: one thread at a time.
@@ -64,6 +64,9 @@ class PoseAligner {
   double cost_at(const float* point, Eigen::Matrix<double, 5, 1>* x) const;
   void follow(const PosePicture& picture, const PoseSpace& space, std::size_t start, AlignedPose& end);
   double fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose);
+  /// Where there are several DOFs, their covariance together, as the normal equations of the last round have
+  /// it. @param variance of each number of a point.
+  void relate(const PoseSpace& space, double variance, AlignedPose& pose) const;
 
   AlignmentOptions options_;
   Eigen::Matrix<double, 5, 1> precision_;

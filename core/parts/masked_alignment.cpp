@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include "core/manifold/pose_covariance.h"
 #include "core/parts/dense_kernels.h"
 
 namespace eigenpose {
@@ -146,8 +147,8 @@ void MaskedAligner::move(MaskedPose& masked, double step_share) {
       const double curvature = *(best - 1) - 2.0 * *best + *(best + 1);
       if (curvature > 0.0) {
         offset = 0.5 * (*(best - 1) - *(best + 1)) / curvature;
-        pose.q_sigma[a] = step * std::sqrt(2.0 * std::max(*best, options_.noise) /
-                                           (curvature * static_cast<double>(quadratic_.cols())));
+        pose.q_covariance[a * axes.size() + a] = step * step * 2.0 * std::max(*best, options_.noise) /
+                                                 (curvature * static_cast<double>(quadratic_.cols()));
       }
     }
     q[a] = axes[a].dof.canonical(centre + (at - steps + offset) * step);
@@ -167,11 +168,21 @@ void MaskedAligner::move(MaskedPose& masked, double step_share) {
   pose.misalignment = {std::clamp(moved(0) + gain, -0.8, 5.0), moved(1), moved(2), moved(3), moved(4)};
 }
 
+void MaskedAligner::relate(AlignedPose& pose) const {
+  const Eigen::MatrixXd jacobian = space_->coarse_manifold().evaluate_with_jacobian(pose.q).jacobian;
+  const Eigen::MatrixXf weighed = quadratic_.selfadjointView<Eigen::Lower>() * jacobian.cast<float>().eval();
+  const Eigen::MatrixXd with_misalignment = linear_.rightCols(5).cast<double>().transpose() * jacobian;
+  const double variance = std::max(pose.cost, options_.noise) / static_cast<double>(quadratic_.cols());
+  set_covariance(jacobian.transpose() * weighed.cast<double>() -
+                     with_misalignment.transpose() * inverse_ * with_misalignment,
+                 variance, pose.q_covariance);
+}
+
 MaskedPose MaskedAligner::approach(const std::vector<double>& start, double reach) {
   MaskedPose masked;
   AlignedPose& pose = masked.aligned;
   pose.q = start;
-  pose.q_sigma.assign(start.size(), std::numeric_limits<double>::infinity());
+  pose.q_covariance = unseen_pose(start.size());
   weights_ = Eigen::Map<const Eigen::VectorXf>(trust_.data(), static_cast<Eigen::Index>(trust_.size()));
   if (!trusted_quadratic_known_) {
     weigh_basis();
@@ -203,6 +214,7 @@ void MaskedAligner::refine(MaskedPose& masked, double reach) {
     prepare(pose.misalignment, masked.first_gain);
     move(masked, step_of_round(round, reach));
   }
+  if (pose.q.size() > 1) relate(pose);
   scale.warp(*picture_, pose.misalignment, false, warped_);
   space_->render(pose.q, rendered_);
   masked.unexplained = 0.0;

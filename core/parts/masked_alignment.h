@@ -53,6 +53,8 @@ class MaskedAligner {
   void prepare(const Misalignment& misalignment, double first_gain);
   /// Cost at a pose after its best further misalignment, which goes to `x`.
   double cost_at(const std::vector<double>& q, Vector5* x);
+  /// Where there are several DOFs, their covariance together.
+  void relate(AlignedPose& pose) const;
   /// Moves a pose to the lowest cost along each DOF, then undoes its further misalignment.
   /// @param step_share of each DOF's range, between the poses that are looked at.
   void move(MaskedPose& pose, double step_share);

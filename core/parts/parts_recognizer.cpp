@@ -211,7 +211,7 @@ void PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<flo
     return window_count * pose.votes - 0.5 * pose.cost / model.noise;
   };
   for (const AlignedPose& found : aligner.align(posed(), space)) {
-    PartsPose pose{found.q, found.q_sigma, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
                    0.0};
     pose.votes = votes_near(plain, parts, space, pose.q) / windows.total_weight;
     pose.merit = merit(pose);
@@ -303,7 +303,7 @@ void PartsRecognizer::Impl::refine_covered(CoveredAnswer& found, double hopeless
     const double merit = vote_merit * start.votes -
                          visible_merit * std::log(std::max(pose.cost, model.noise)) -
                          unexplained_merit * start.pose.unexplained;
-    answer.poses.push_back({pose.q, pose.q_sigma, pose.misalignment, pose.cost, start.votes, merit});
+    answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit});
   }
   std::ranges::stable_sort(answer.poses, std::greater<>(), &PartsPose::merit);
   if (!answer.poses.empty()) answer.score = 1.0 - answer.poses.front().votes;
@@ -385,7 +385,7 @@ void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes,
     const CoveredStart& start = rival.starts.front();
     const AlignedPose& pose = start.pose.aligned;
     rival.answer.score = 1.0 - start.votes;
-    rival.answer.poses.push_back({pose.q, pose.q_sigma, pose.misalignment, pose.cost, start.votes,
+    rival.answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes,
                                   best - std::max(most - start.merit, hopeless_merit)});
   }
   const auto ranked = std::span(rivals).first(contenders);

@@ -16,7 +16,7 @@ namespace eigenpose {
 /// One object and pose that windows and alignment agree on.
 struct PartsPose {
   std::vector<double> q;
-  std::vector<double> q_sigma;
+  std::vector<double> q_covariance;  ///< m × m, row by row; infinite where a DOF cannot be seen
   Misalignment misalignment;
   double cost = 0.0;   ///< squared distance in the pose space after alignment
   double votes = 0.0;  ///< share of the windows' weight that votes for this pose, 0…1

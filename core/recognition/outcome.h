@@ -3,6 +3,7 @@
 /// What recognition says of one region of a picture.
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,11 +45,20 @@ struct Outcome {
   std::optional<Hypothesis> other_pose;
   /// 1-sigma uncertainty of each value of `best->q`, in its unit; infinite where the pose cannot be seen.
   std::vector<double> q_sigma;
+  /// Of `best->q`, m × m, row by row; its diagonal is q_sigma².
+  std::vector<double> q_covariance;
   double rejection_distance = 0.0;  ///< of the best object; `best->distance` is compared with it
   /// Share of the region that does not show the best object: something covers it, or stands beside it. An
   /// object that is partly covered is recognised by its windows, whatever its distance.
   double covered_share = 0.0;
   double confidence = 0.0;  ///< 0…1
+
+  /// Sets q_covariance to m × m numbers times `scale`, and q_sigma. DOFs that are not `observable` become
+  /// infinite, and related to none.
+  void set_covariance(std::span<const double> covariance, double scale, const std::vector<bool>& observable);
 };
+
+/// q_covariance, one list a row.
+std::vector<std::vector<double>> covariance_rows(const Outcome& outcome);
 
 }  // namespace eigenpose

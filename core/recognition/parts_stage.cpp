@@ -73,7 +73,7 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
   poses_.clear();
   bool clear = true;
   for (const AlignedPose& found : aligned) {
-    PartsPose pose{found.q, found.q_sigma, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
                    0.0};
     pose.merit = -0.5 * pose.cost / model_.parts->noise;
     if (!poses_.empty() && apart(object, pose.q, poses_.front().q))
@@ -142,10 +142,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
   outcome.best = {object.name, best.q, finding.distance.own};
   outcome.rejection_distance = calibration.rejection_distance;
   outcome.covered_share = finding.covered;
-  outcome.q_sigma.clear();
-  for (std::size_t d = 0; d < best.q_sigma.size(); ++d)
-    outcome.q_sigma.push_back(object.dof_observable[d] ? sigma_inflation * best.q_sigma[d]
-                                                       : std::numeric_limits<double>::infinity());
+  outcome.set_covariance(best.q_covariance, sigma_inflation * sigma_inflation, object.dof_observable);
   if (const auto& other = finding.distance.other) {
     const ModelObject& second = model_.objects[other->manifold];
     outcome.runner_up = {

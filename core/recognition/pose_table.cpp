@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/linear_algebra.h"
+#include "core/manifold/pose_covariance.h"
 
 namespace eigenpose {
 namespace {
@@ -27,23 +27,6 @@ std::vector<double> sample_positions(const SampleAxis& axis, int per_step) {
   return values;
 }
 
-/// sqrt(diag((JᵀJ)⁻¹)), infinite for DOFs without effect.
-void sensitivity_of(const Eigen::MatrixXd& jacobian, double* out) {
-  const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
-  const auto covariance = inverse_of(information);
-  const auto m = static_cast<std::size_t>(information.rows());
-  if (!covariance) {
-    for (std::size_t d = 0; d < m; ++d) {
-      const double own = information(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(d));
-      out[d] = own > 0.0 ? 1.0 / std::sqrt(own) : std::numeric_limits<double>::infinity();
-    }
-    return;
-  }
-  for (std::size_t d = 0; d < m; ++d)
-    out[d] =
-        std::sqrt(std::max(0.0, (*covariance)(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(d))));
-}
-
 }  // namespace
 
 PoseTable::PoseTable(const Manifold& manifold) {
@@ -57,13 +40,17 @@ PoseTable::PoseTable(const Manifold& manifold) {
   }
   points_.resize(manifold.dimensions(), static_cast<Eigen::Index>(samples));
   squared_.resize(static_cast<Eigen::Index>(samples));
-  sensitivity_.resize(samples * axes_.size());
+  const std::size_t m = axes_.size();
+  covariance_.reserve(samples * m * m);
+  std::vector<double> covariance;
   std::vector<double> q(axes_.size());
   for (std::size_t s = 0; s < samples; ++s) {
     for (std::size_t d = 0; d < axes_.size(); ++d) q[d] = value(s, axes_[d]);
     const ManifoldPoint point = manifold.evaluate_with_jacobian(q);
     points_.col(static_cast<Eigen::Index>(s)) = point.value.cast<float>();
-    sensitivity_of(point.jacobian, sensitivity_.data() + s * axes_.size());
+    covariance = unseen_pose(m);
+    set_covariance(point.jacobian.transpose() * point.jacobian, 1.0, covariance);
+    covariance_.insert(covariance_.end(), covariance.begin(), covariance.end());
   }
 }
 
@@ -135,10 +122,11 @@ std::vector<double> PoseTable::pose(std::size_t sample) const {
   return q;
 }
 
-std::span<const double> PoseTable::sensitivity(std::span<const double> q) const {
+std::span<const double> PoseTable::covariance(std::span<const double> q) const {
   std::size_t sample = 0;
   for (std::size_t d = 0; d < axes_.size(); ++d) sample += nearest_index(axes_[d], q[d]) * axes_[d].stride;
-  return {sensitivity_.data() + sample * axes_.size(), axes_.size()};
+  const std::size_t m = axes_.size();
+  return std::span(covariance_).subspan(sample * m * m, m * m);
 }
 
 }  // namespace eigenpose

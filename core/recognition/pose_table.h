@@ -32,9 +32,9 @@ class PoseTable {
                                                  std::span<const double> q, double apart,
                                                  std::span<double> other_q);
 
-  /// For each DOF the standard deviation of q per standard deviation of each number of the point, at the
-  /// sample next to `q`: sqrt(diag((JᵀJ)⁻¹)). Infinite where the point does not depend on the DOF.
-  [[nodiscard]] std::span<const double> sensitivity(std::span<const double> q) const;
+  /// Covariance of q where each number of the point has variance 1, at the sample next to `q`: (JᵀJ)⁻¹, m ×
+  /// m, row by row. Infinite where the point does not depend on a DOF.
+  [[nodiscard]] std::span<const double> covariance(std::span<const double> q) const;
 
   [[nodiscard]] std::size_t dofs() const { return axes_.size(); }
   [[nodiscard]] std::size_t samples() const { return static_cast<std::size_t>(points_.cols()); }
@@ -60,9 +60,9 @@ class PoseTable {
   }
 
   std::vector<Axis> axes_;
-  Eigen::MatrixXf points_;           ///< K × samples
-  std::vector<double> sensitivity_;  ///< samples × m
-  Eigen::VectorXf squared_;          ///< scratch: squared distance of each sample
+  Eigen::MatrixXf points_;          ///< K × samples
+  std::vector<double> covariance_;  ///< samples × m × m
+  Eigen::VectorXf squared_;         ///< scratch: squared distance of each sample
 };
 
 }  // namespace eigenpose

@@ -241,10 +241,8 @@ void Recognizer::Impl::take_apart(const cv::Mat& image, std::size_t region) {
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
   const ModelObject& object = model->objects[best.manifold];
   const double sigma = std::max(best.distance, object.typical_distance) / std::sqrt(effective_dimensions);
-  const auto sensitivity = poses[best.manifold].sensitivity(outcome.best->q);
-  for (std::size_t d = 0; d < sensitivity.size(); ++d)
-    outcome.q_sigma.push_back(object.dof_observable[d] ? sigma * sensitivity[d]
-                                                       : std::numeric_limits<double>::infinity());
+  outcome.set_covariance(poses[best.manifold].covariance(outcome.best->q), sigma * sigma,
+                         object.dof_observable);
 }
 
 Outcome& Recognizer::Impl::next_outcome() {
@@ -255,6 +253,7 @@ Outcome& Recognizer::Impl::next_outcome() {
   give_back(outcome.runner_up);
   give_back(outcome.other_pose);
   outcome.q_sigma.clear();
+  outcome.q_covariance.clear();
   outcome.rejection_distance = 0.0;
   outcome.covered_share = 0.0;
   outcome.confidence = 0.0;

@@ -48,6 +48,7 @@ json to_json(const Result& result, const Outcome& outcome) {
                 {"pose", json::object()},
                 {"distance", nullptr},
                 {"q_sigma", std::move(sigma)},
+                {"q_covariance", covariance_rows(outcome)},  // infinite numbers become null
                 {"rejection_distance", outcome.rejection_distance},
                 {"covered_share", outcome.covered_share},
                 {"confidence", outcome.confidence},

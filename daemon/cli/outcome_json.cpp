@@ -44,6 +44,7 @@ json to_json(const Outcome& outcome, const Model& model) {
                  {"q", json::array()},
                  {"pose", json::object()},
                  {"q_sigma", sigma},
+                 {"q_covariance", covariance_rows(outcome)},  // infinite numbers become null
                  {"distance", nullptr},
                  {"rejection_distance", outcome.rejection_distance},
                  {"covered_share", outcome.covered_share},

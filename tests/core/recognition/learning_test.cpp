@@ -173,6 +173,20 @@ TEST_F(Learning, LearnsPoseAndLightTogether) {
   LearningOptions too_few = testing::small_learning();
   too_few.solver.components = 2;
   EXPECT_THROW(learn(all_views(sets), too_few), Error) << "the manifold would fill its space";
+  LearningOptions with_windows = testing::small_learning();
+  with_windows.parts = true;
+  for (const LearningOptions& options : {testing::small_learning(), with_windows}) {
+    Recognizer recognizer(std::make_shared<const Model>(learn(all_views(sets), options)));
+    const auto outcomes = recognizer.recognize(lit(120.0, 10.0));
+    ASSERT_EQ(outcomes.size(), 1U);
+    const std::vector<double>& covariance = outcomes[0].q_covariance;
+    ASSERT_EQ(covariance.size(), 4U) << "of the two together";
+    EXPECT_NEAR(covariance[1], covariance[2], 1e-6 * std::abs(covariance[1]));
+    EXPECT_GT(covariance[0] * covariance[3], covariance[1] * covariance[2]);
+    EXPECT_NEAR(std::sqrt(covariance[0]), outcomes[0].q_sigma[0], 1e-9);
+    EXPECT_LT(outcomes[0].q_sigma[0], 20.0);
+    EXPECT_LT(outcomes[0].q_sigma[1], 20.0);
+  }
   const auto model = std::make_shared<const Model>(learn(all_views(sets), testing::small_learning()));
   ASSERT_EQ(model->objects[0].dof_observable, (std::vector<bool>{true, true}));
   Recognizer recognizer(model);
