@@ -129,7 +129,7 @@ struct PartsRecognizer::Impl {
   double foreign_share(std::size_t object, int candidate);
   /// The same of the view with most votes.
   double covered_share(std::size_t object, const std::vector<float>& plain);
-  void find_poses(std::size_t object, const std::vector<float>& plain, PartsAnswer& answer);
+  PartsAnswer find_poses(std::size_t object, const std::vector<float>& plain, double covered);
   CoveredAnswer approach_covered(std::size_t object, const std::vector<float>& plain, double covered);
   /// Follows the starts of this merit and more to the end.
   void refine_covered(CoveredAnswer& found, double hopeless);
@@ -203,8 +203,11 @@ std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
   return weights;
 }
 
-void PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<float>& plain,
-                                       PartsAnswer& answer) {
+PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<float>& plain,
+                                              double covered) {
+  PartsAnswer answer;
+  answer.object = object;
+  answer.covered = covered;
   const PartsObject& parts = model.objects[object];
   const PoseSpace& space = model.poses[object];
   const auto merit = [&](const PartsPose& pose) {
@@ -231,6 +234,7 @@ void PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<flo
     pose.merit = merit(pose);
   }
   std::stable_sort(answer.poses.begin(), answer.poses.end(), better);
+  return answer;
 }
 
 std::vector<double> PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
@@ -348,16 +352,11 @@ PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   Impl& impl = *impl_;
   const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, object);
   const double share = impl.covered_share(object, plain);
-  if (covered || share > impl.model.calibration[object].covered_share) {
-    CoveredAnswer found = impl.approach_covered(object, plain, share);
-    impl.refine_covered(found, found.starts.front().merit - hopeless_merit);
-    return std::move(found.answer);
-  }
-  PartsAnswer answer;
-  answer.object = object;
-  answer.covered = share;
-  impl.find_poses(object, plain, answer);
-  return answer;
+  if (!covered && share <= impl.model.calibration[object].covered_share)
+    return impl.find_poses(object, plain, share);
+  CoveredAnswer found = impl.approach_covered(object, plain, share);
+  impl.refine_covered(found, found.starts.front().merit - hopeless_merit);
+  return std::move(found.answer);
 }
 
 void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes, PartsIdentification& found) {
@@ -399,13 +398,14 @@ PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> short
   Impl& impl = *impl_;
   const auto votes = vote(shortlist);
   const std::size_t first = votes[0].object;
-  const double share = impl.covered_share(first, impl.matcher.plain_votes(impl.windows, first));
+  const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, first);
+  const double share = impl.covered_share(first, plain);
   covered = covered || share > impl.model.calibration[first].covered_share;
   PartsIdentification found;
   if (covered) {
     impl.identify_covered(votes, found);
   } else {
-    found.best = settle(first);
+    found.best = impl.find_poses(first, plain, share);
     if (votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);
   }
   const auto votes_for = [&](const PartsAnswer& answer) {

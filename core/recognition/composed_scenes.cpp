@@ -7,6 +7,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/foreground.h"
 #include "core/image/region.h"
 
 namespace eigenpose {
@@ -53,16 +54,9 @@ std::optional<SceneComposer::Cut> SceneComposer::cut(const SetView& shown) {
   Cut cut;
   segmenter_.cut_out(image, static_cast<std::size_t>(largest - regions.begin())).copyTo(cut.pixels);
   cut.background = segmenter_.background().color();
-  cv::Mat brightest = cut.pixels;
-  if (cut.pixels.channels() == 3) {
-    cv::Mat bands[3];
-    cv::split(cut.pixels, bands);
-    brightest = cv::max(cv::max(bands[0], bands[1]), bands[2]);
-  }
+  cut.mask = foreground_of(cut.pixels, segmenter_.background());
   // All within the outline is the object, however dark.
   std::vector<std::vector<cv::Point>> outlines;
-  const cv::Mat above = brightest > segmenter_.background().threshold;
-  cv::morphologyEx(above, cut.mask, cv::MORPH_CLOSE, cv::Mat::ones(7, 7, CV_8U));
   cv::findContours(cut.mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   cv::drawContours(cut.mask, outlines, -1, cv::Scalar::all(255), cv::FILLED);
   return cut;

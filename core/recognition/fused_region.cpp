@@ -7,6 +7,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/foreground.h"
 #include "core/image/region.h"
 
 namespace eigenpose {
@@ -23,7 +24,7 @@ constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
 constexpr double place_step = 0.2;      ///< between boxes away from the corners, in their sides
 constexpr double least_filled = 0.6;    ///< of a box away from the corners: foreground
 constexpr double same_place = 0.7;      ///< of two boxes' union
-constexpr int most_looks = 3000;        ///< at boxes; a region that asks for more stays in one piece
+constexpr int most_looks = 3000;        ///< at boxes; then it stays with what was found
 constexpr std::size_t most_first = 3;   ///< of them, those that are followed to the end
 constexpr std::size_t most_objects = 6;
 /// A remaining piece of this share of the smallest learned box, or more, may be an object; less is outline.
@@ -40,21 +41,6 @@ constexpr double beyond_doubt = 1.5;  ///< evidence more than is asked for
 /// A known object that is so much larger than it was learned may be two.
 constexpr double doubtful_size = 1.3;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
-
-cv::Mat foreground_of(const cv::Mat& cut, const Background& background) {
-  cv::Mat brightest;
-  if (cut.channels() == 3) {
-    std::vector<cv::Mat> bands;
-    cv::split(cut, bands);
-    brightest = cv::max(cv::max(bands[0], bands[1]), bands[2]);
-  } else {
-    brightest = cut;
-  }
-  cv::Mat mask = brightest > background.threshold;
-  // Dark spots of an object are part of it.
-  cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, cv::Mat::ones(7, 7, CV_8U));
-  return mask;
-}
 
 /// Whether enough of a box is foreground for an object. @param sums integral of a foreground.
 bool filled(const cv::Rect& box, const cv::Mat& sums) {

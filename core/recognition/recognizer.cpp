@@ -227,7 +227,9 @@ void Recognizer::Impl::judge(Outcome& outcome) {
 void Recognizer::Impl::take_apart(const cv::Mat& image, std::size_t region) {
   if (model->normalization.cropped) return;
   const TakenApart& found = parts->take_apart(segmenter.cut_out(image, region), segmenter.background());
-  if (found.objects.empty()) return;
+  // What is recognised as one gives way only to objects that make up all of it.
+  const bool known = outcomes[outcome_count - 1].verdict != Verdict::unknown;
+  if (found.objects.empty() || (known && !found.unknown.empty())) return;
   const cv::Rect frame(0, 0, image.cols, image.rows);
   const cv::Point corner = outcomes[--outcome_count].box.tl();
   for (const FusedObject& object : found.objects) {

@@ -212,6 +212,22 @@ TEST_F(OfflineCommands, InspectShowsTheGeometryOfManifolds) {
   EXPECT_NEAR(across, 0.0, 1e-9) << "the normal stands on the tangent";
 }
 
+TEST_F(OfflineCommands, EvaluateShowsScenesOfSeveralObjects) {
+  write_objects();
+  const std::string line = "evaluate sets --learn-every 2 --size 32 --whole-region";
+  const Ended shown = eigenpose(line + " --scenes 10 --json 2>/dev/null");
+  ASSERT_EQ(shown.code, 0) << shown.output;
+  const json scenes = json::parse(shown.output)["scenes"];
+  EXPECT_EQ(scenes["scenes"], 10);
+  EXPECT_GE(scenes["objects"].get<int>(), 20);
+  EXPECT_EQ(scenes["found_rate"], 1.0);
+  EXPECT_EQ(scenes["extra_boxes"], 0);
+  EXPECT_THAT(eigenpose(line + " --scenes 10 --overlap 0.2").output, HasSubstr("scenes      10 with"));
+  const Ended unsaid = eigenpose(line + " --overlap 0.2");
+  EXPECT_EQ(unsaid.code, 1);
+  EXPECT_THAT(unsaid.output, HasSubstr("--scenes 200"));
+}
+
 // Views of 256 x 256 pixels, four times the memory that learning is given, in a process that may have no more
 // data than that and what the program itself takes. Without the limit the same process cannot learn them.
 TEST_F(OfflineCommands, LearnASetOfFourTimesTheMemoryLimitUnderThatLimit) {

@@ -87,6 +87,18 @@ TEST(FusedRegion, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
   EXPECT_EQ(outcomes[1].best->object, "two");
 }
 
+TEST(FusedRegion, LeavesAnObjectThatStandsNearerThanItWasLearnedInOnePiece) {
+  Recognizer recognize(world().model);
+  for (double angle = 5.0; angle < 360.0; angle += 60.0) {
+    SceneKnobs near = SceneKnobs::centred(400, 300, 2.4);  // half as large again
+    const auto outcomes = recognize.recognize(testing::scene_with(1, angle, near));
+    ASSERT_EQ(outcomes.size(), 1U) << angle;
+    ASSERT_EQ(outcomes[0].verdict, Verdict::recognized) << angle;
+    EXPECT_EQ(outcomes[0].best->object, "one");
+    EXPECT_LT(std::abs(circular_difference(outcomes[0].best->q[0], angle, 360.0)), 12.0);
+  }
+}
+
 TEST(FusedRegion, LeavesStrangersInOnePiece) {
   Recognizer recognize(world().model);
   int taken_apart = 0;
