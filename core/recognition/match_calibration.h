@@ -3,12 +3,13 @@
 /// Rejection distances of the aligned whole-region match, from the learned views alone.
 ///
 /// Every learned view is moved at random, as an imperfect cut-out does it, aligned, and measured against its
-/// own manifold: as learned, without every second view, and with every fourth only. What the spline misses at
-/// a new view, half a step from a learned one, is read off the power law through the other two; its mean and
-/// maximum are the object's scale. The threshold is a multiple of that scale: the conformal quantile, over
-/// all views and objects, of the distances found at half the views, in the scale expected from a fourth of
-/// them. With n views, it bounds the rate of wrong rejections by k/(n + 1), as far as the law holds from one
-/// density to the next.
+/// own manifold: as learned, and without every second view, with every fourth and every eighth only. By how
+/// much the spline misses more when the step doubles is seen twice so; from both, what it misses at a new
+/// view, half a step from a learned one. How far single views are off such an expectation is seen at half the
+/// views, of which it is known what they miss, and what was to be expected from a fourth. A few views show
+/// what comes into sight at once: of these, smaller steps promise nothing. An object's threshold is the
+/// distance that a share of its new views, the rate, is expected to exceed; n views support no rate below
+/// 1/(n + 1).
 
 #include <optional>
 #include <span>
@@ -35,7 +36,10 @@ struct MatchCalibrationOptions {
 struct MatchEvidence {
   double scale = 0.0;             ///< in which its distances are measured
   double typical_distance = 0.0;  ///< root mean square expected of new views
-  std::vector<double> scores;     ///< distances of left-out views in the scale expected of them
+  std::vector<double> learned;    ///< squared distance of each view to the manifold that knows it
+  double missed = 0.0;            ///< what the spline adds to it where the step is twice as large, on average
+  double growth = 1.0;            ///< `missed` over what it is expected to be at new views
+  std::vector<double> factors;    ///< what it added at views left out, over what was expected on average
   std::vector<double> others;     ///< distance of each view to the nearest other object
   double false_lead = 1.0;  ///< squared distances, other over own, of the worst view that another object wins
 };
