@@ -111,10 +111,14 @@ void Manifold::derivative(std::span<const double> q, std::span<const int> orders
 }
 
 Eigen::VectorXd Manifold::evaluate(std::span<const double> q) const {
-  const std::array<int, max_manifold_dofs> none{};
   Eigen::VectorXd value;
-  derivative(q, std::span(none).first(dofs()), value);
+  evaluate_into(q, value);
   return value;
+}
+
+void Manifold::evaluate_into(std::span<const double> q, Eigen::VectorXd& out) const {
+  const std::array<int, max_manifold_dofs> none{};
+  derivative(q, std::span(none).first(dofs()), out);
 }
 
 ManifoldPoint Manifold::evaluate_with_jacobian(std::span<const double> q) const {

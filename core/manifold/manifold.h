@@ -50,6 +50,8 @@ class Manifold {
   /// sample; an open one of degree 2 or 3 has two more, one beyond each end.
   [[nodiscard]] const Eigen::MatrixXd& coefficients() const { return coefficients_; }
 
+  /// f(q), into `out`, as `derivative` writes it.
+  void evaluate_into(std::span<const double> q, Eigen::VectorXd& out) const;
   /// f(q). Periodic DOFs take any value; open ones are clamped to their first and last sample.
   /// @throws std::invalid_argument when q.size() ≠ m.
   [[nodiscard]] Eigen::VectorXd evaluate(std::span<const double> q) const;

@@ -1,20 +1,20 @@
 #include "core/manifold/pose_covariance.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "core/base/linear_algebra.h"
 
 namespace eigenpose {
 
-std::vector<double> unseen_pose(std::size_t dofs) {
-  std::vector<double> covariance(dofs * dofs, 0.0);
+void set_unseen(std::size_t dofs, std::span<double> covariance) {
+  std::fill(covariance.begin(), covariance.end(), 0.0);
   for (std::size_t d = 0; d < dofs; ++d) covariance[d * dofs + d] = std::numeric_limits<double>::infinity();
-  return covariance;
 }
 
-void set_covariance(const Eigen::MatrixXd& information, double variance, std::vector<double>& covariance) {
+void set_covariance(const Eigen::MatrixXd& information, double variance, std::span<double> covariance) {
   const Eigen::Index m = information.rows();
-  covariance = unseen_pose(static_cast<std::size_t>(m));
+  set_unseen(static_cast<std::size_t>(m), covariance);
   const auto at = [&](Eigen::Index row, Eigen::Index column) -> double& {
     return covariance[static_cast<std::size_t>(row * m + column)];
   };

@@ -52,21 +52,28 @@ Vector5 AlignmentPrior::precision() const {
   return sigma.cwiseAbs2().cwiseInverse();
 }
 
-void PoseAligner::project(const PoseScale& scale, const PosePicture& picture, const Misalignment& p) {
-  scale.warp(picture, p, true, warped_);
-  projected_.resize(scale.basis.cols(), warped_.cols());
+void PoseAligner::project(const PoseSpace& space, const PoseScale& scale, const PosePicture& picture,
+                          const Misalignment& p) {
+  Eigen::MatrixXf& warped = &scale == &space.coarse() ? coarse_warped_ : fine_warped_;
+  scale.warp(picture, p, true, warped);
+  dimensions_ = scale.basis.cols();
+  const auto columns = static_cast<std::size_t>(warped.cols());
+  projected_.resize(static_cast<std::size_t>(dimensions_) * columns);
   multiply_transposed_six(scale.basis.data(), static_cast<int>(scale.basis.rows()),
-                          static_cast<int>(scale.basis.cols()), warped_.data(), projected_.data(),
-                          static_cast<int>(scale.basis.cols()));
-  projected_.col(0) -= scale.mean;
+                          static_cast<int>(dimensions_), warped.data(), projected_.data(),
+                          static_cast<int>(dimensions_));
+  Eigen::Map<Eigen::VectorXf>(projected_.data(), dimensions_) -= scale.mean;
   prepare(p);
 }
 
 void PoseAligner::prepare(const Misalignment& p) {
-  const Eigen::MatrixXd tangents = projected_.rightCols(5).cast<double>();
   const Vector5 undone = as_vector(p);
   const Vector5 pull = options_.noise * precision_.cwiseProduct(undone);
-  Eigen::Matrix<double, 5, 5> normal = tangents.transpose() * tangents;
+  Eigen::Matrix<double, 5, 5> normal;
+  const auto columns = tangents();
+  for (Eigen::Index i = 0; i < normal.rows(); ++i)
+    for (Eigen::Index j = 0; j <= i; ++j)
+      normal(i, j) = normal(j, i) = columns.col(i).cast<double>().dot(columns.col(j).cast<double>());
   normal.diagonal() += options_.noise * precision_;
   inverse_ = normal.inverse();
   prior_pull_ = pull;
@@ -74,7 +81,7 @@ void PoseAligner::prepare(const Misalignment& p) {
 }
 
 double PoseAligner::cost_at(const float* point, Vector5* x) const {
-  const auto dims = static_cast<int>(projected_.rows());
+  const auto dims = static_cast<int>(dimensions_);
   float squared = 0.0F;
   float products[5] = {};
   residual_products(point, projected_.data(), dims, squared, products);
@@ -97,7 +104,7 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
   Vector5 x;
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < options_.rounds; ++round) {
-    project(space.coarse(), picture, p);
+    project(space, space.coarse(), picture, p);
     // Coordinate-wise descent over the grid within reach: exact for one DOF.
     std::size_t found = here;
     double lowest = cost_at(space.samples().col(static_cast<Eigen::Index>(here)).data(), nullptr);
@@ -133,8 +140,9 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
   end.fine_cost = best;
   const auto dofs = static_cast<std::size_t>(space.sample_poses().rows());
   end.q.resize(dofs);
-  end.q_covariance = unseen_pose(dofs);
-  const double variance = std::max(best, options_.noise) / static_cast<double>(projected_.rows());
+  end.q_covariance.resize(dofs * dofs);
+  set_unseen(dofs, end.q_covariance);
+  const double variance = std::max(best, options_.noise) / static_cast<double>(dimensions_);
   for (std::size_t a = 0; a < dofs; ++a) {
     const double q = space.sample_poses()(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(here));
     end.q[a] = q;
@@ -160,28 +168,29 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
 
 void PoseAligner::relate(const PoseSpace& space, double variance, AlignedPose& pose) const {
   const Eigen::MatrixXd jacobian = space.coarse_manifold().evaluate_with_jacobian(pose.q).jacobian;
-  const Eigen::MatrixXd with_misalignment = projected_.rightCols(5).cast<double>().transpose() * jacobian;
+  const Eigen::MatrixXd with_misalignment = tangents().cast<double>().transpose() * jacobian;
   set_covariance(
       jacobian.transpose() * jacobian - with_misalignment.transpose() * inverse_ * with_misalignment,
       variance, pose.q_covariance);
 }
 
 double PoseAligner::fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose) {
-  project(space.fine(), picture, pose.misalignment);
+  project(space, space.fine(), picture, pose.misalignment);
   const Dof& dof = space.fine_manifold().axes()[0].dof;
   double lowest = std::numeric_limits<double>::infinity();
-  std::vector<double> q = pose.q;
+  PoseNumbers q = pose.q;
   const double step = dof.period() / 360.0;
   for (int s = -5; s <= 5; ++s) {
     q[0] = pose.q[0] + s * step;
-    const Eigen::VectorXf point = space.fine_manifold().evaluate(q).cast<float>();
-    lowest = std::min(lowest, cost_at(point.data(), nullptr));
+    space.fine_manifold().evaluate_into(q, fine_point_);
+    fine_numbers_.assign(fine_point_.begin(), fine_point_.end());
+    lowest = std::min(lowest, cost_at(fine_numbers_.data(), nullptr));
   }
   return lowest;
 }
 
 const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, const PoseSpace& space) {
-  project(space.coarse(), picture, {});
+  project(space, space.coarse(), picture, {});
   const auto total = static_cast<std::size_t>(space.samples().cols());
   costs_.resize(total);
   for (std::size_t t = 0; t < total; ++t) {
@@ -200,7 +209,7 @@ const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, c
       minima_.push_back(t);
     }
   }
-  const auto starts = std::min(minima_.size(), static_cast<std::size_t>(options_.starts));
+  const auto starts = std::min(minima_.size(), options_.starts);
   std::partial_sort(minima_.begin(), minima_.begin() + static_cast<std::ptrdiff_t>(starts), minima_.end(),
                     [this](std::size_t a, std::size_t b) { return costs_[a] < costs_[b]; });
   poses_.clear();
@@ -221,12 +230,11 @@ const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, c
       return true;
     });
     if (!known) {
-      poses_.push_back(std::move(pose));
+      poses_.push_back(pose);
     }
   }
   if (options_.fine && poses_.size() > 1) {
-    std::sort(poses_.begin(), poses_.end(),
-              [](const AlignedPose& a, const AlignedPose& b) { return a.cost < b.cost; });
+    sort_few(poses_, [](const AlignedPose& a, const AlignedPose& b) { return a.cost < b.cost; });
     AlignedPose& best = poses_.front();
     best.fine_cost = fine_cost(picture, space, best);
     const double finer = best.fine_cost - best.cost;
@@ -235,8 +243,7 @@ const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, c
       pose.fine_cost = close ? fine_cost(picture, space, pose) : pose.cost + finer;
     }
   }
-  std::stable_sort(poses_.begin(), poses_.end(),
-                   [](const AlignedPose& a, const AlignedPose& b) { return a.fine_cost < b.fine_cost; });
+  sort_few(poses_, [](const AlignedPose& a, const AlignedPose& b) { return a.fine_cost < b.fine_cost; });
   return poses_;
 }
 

@@ -10,10 +10,12 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "core/base/bounded_vector.h"
 #include "core/parts/pose_space.h"
 
 namespace eigenpose {
@@ -28,10 +30,13 @@ struct AlignmentPrior {
   [[nodiscard]] Eigen::Matrix<double, 5, 1> precision() const;
 };
 
+/// The most poses of one object that are followed.
+inline constexpr std::size_t most_poses = 6;
+
 struct AlignmentOptions {
   AlignmentPrior prior;
-  double noise = 1e-4;  ///< ν, squared length between unit-energy appearances
-  int starts = 6;       ///< minima over the pose that are followed
+  double noise = 1e-4;              ///< ν, squared length between unit-energy appearances
+  std::size_t starts = most_poses;  ///< minima over the pose that are followed
   double hopeless =
       60.0;        ///< minima higher than twice the deepest by more than this times ν are not followed
   int rounds = 6;  ///< Gauss–Newton rounds each
@@ -40,13 +45,17 @@ struct AlignmentOptions {
   double close = 40.0;  ///< ends higher than the deepest by more than this times ν are as bad there too
 };
 
+/// The numbers of a pose, and m × m of its covariance, row by row.
+using PoseNumbers = BoundedVector<double, max_manifold_dofs>;
+using PoseSquare = BoundedVector<double, max_manifold_dofs * max_manifold_dofs>;
+
 /// One pose that fits a region.
 struct AlignedPose {
-  std::vector<double> q;
+  PoseNumbers q;
   Misalignment misalignment;
-  double cost = 0.0;                 ///< squared distance after alignment plus νpᵀΛp, coarse scale
-  double fine_cost = 0.0;            ///< the same at the fine scale, where poses are compared there
-  std::vector<double> q_covariance;  ///< m × m, row by row; infinite where a DOF cannot be seen
+  double cost = 0.0;        ///< squared distance after alignment plus νpᵀΛp, coarse scale
+  double fine_cost = 0.0;   ///< the same at the fine scale, where poses are compared there
+  PoseSquare q_covariance;  ///< infinite where a DOF cannot be seen
 };
 
 /// Aligns regions with pose spaces. Holds scratch memory: one thread at a time.
@@ -58,8 +67,13 @@ class PoseAligner {
   const std::vector<AlignedPose>& align(const PosePicture& picture, const PoseSpace& space);
 
  private:
-  void project(const PoseScale& scale, const PosePicture& picture, const Misalignment& p);
+  void project(const PoseSpace& space, const PoseScale& scale, const PosePicture& picture,
+               const Misalignment& p);
   void prepare(const Misalignment& p);
+  /// J, D × 5.
+  [[nodiscard]] Eigen::Map<const Eigen::MatrixXf> tangents() const {
+    return {projected_.data() + dimensions_, dimensions_, Misalignment::unknowns};
+  }
   /// Cost of one manifold point after its best misalignment, which goes to `x`.
   double cost_at(const float* point, Eigen::Matrix<double, 5, 1>* x) const;
   void follow(const PosePicture& picture, const PoseSpace& space, std::size_t start, AlignedPose& end);
@@ -70,8 +84,12 @@ class PoseAligner {
 
   AlignmentOptions options_;
   Eigen::Matrix<double, 5, 1> precision_;
-  Eigen::MatrixXf warped_;     ///< pixels × 6
-  Eigen::MatrixXf projected_;  ///< D × 6: f, then J
+  Eigen::MatrixXf coarse_warped_;  ///< pixels × 6
+  Eigen::MatrixXf fine_warped_;
+  Eigen::Index dimensions_ = 0;   ///< D
+  std::vector<float> projected_;  ///< D × 6: f, then J
+  Eigen::VectorXd fine_point_;
+  std::vector<float> fine_numbers_;
   Eigen::Matrix<double, 5, 5> inverse_;
   Eigen::Matrix<double, 5, 1> prior_pull_;
   double prior_cost_ = 0.0;

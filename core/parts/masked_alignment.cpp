@@ -115,7 +115,7 @@ void MaskedAligner::prepare(const Misalignment& misalignment, double first_gain)
   inverse_ = normal.inverse();
 }
 
-double MaskedAligner::cost_at(const std::vector<double>& q, Vector5* x) {
+double MaskedAligner::cost_at(std::span<const double> q, Vector5* x) {
   const Eigen::VectorXf point = space_->coarse_manifold().evaluate(q).cast<float>();
   product_.noalias() = quadratic_.selfadjointView<Eigen::Lower>() * point;
   const double squared = static_cast<double>(point.dot(product_ + 2.0F * linear_.col(0))) + constant_;
@@ -129,7 +129,7 @@ double MaskedAligner::cost_at(const std::vector<double>& q, Vector5* x) {
 void MaskedAligner::move(MaskedPose& masked, double step_share) {
   AlignedPose& pose = masked.aligned;
   const auto axes = space_->coarse_manifold().axes();
-  std::vector<double> q = pose.q;
+  PoseNumbers q = pose.q;
   double lowest = cost_at(q, nullptr);
   for (std::size_t a = 0; a < axes.size(); ++a) {
     if (axes[a].samples.size() < 2) continue;
@@ -178,11 +178,13 @@ void MaskedAligner::relate(AlignedPose& pose) const {
                  variance, pose.q_covariance);
 }
 
-MaskedPose MaskedAligner::approach(const std::vector<double>& start, double reach) {
+MaskedPose MaskedAligner::approach(std::span<const double> start, double reach) {
   MaskedPose masked;
   AlignedPose& pose = masked.aligned;
-  pose.q = start;
-  pose.q_covariance = unseen_pose(start.size());
+  pose.q.resize(start.size());
+  std::copy(start.begin(), start.end(), pose.q.begin());
+  pose.q_covariance.resize(start.size() * start.size());
+  set_unseen(start.size(), pose.q_covariance);
   weights_ = Eigen::Map<const Eigen::VectorXf>(trust_.data(), static_cast<Eigen::Index>(trust_.size()));
   if (!trusted_quadratic_known_) {
     weigh_basis();

@@ -35,7 +35,7 @@ class MaskedAligner {
   void look(const PosePicture& picture, const PoseSpace& space, std::span<const float> trust);
   /// The first rounds from a pose, on the coarse scale, by what the windows trust. Cheap beside `refine`.
   /// @param reach how far a round may move the pose, as a share of each DOF's range.
-  MaskedPose approach(const std::vector<double>& start, double reach);
+  MaskedPose approach(std::span<const double> start, double reach);
   /// The later rounds, by what the pose explains.
   /// @param reach as given to `approach`.
   void refine(MaskedPose& pose, double reach);
@@ -52,7 +52,7 @@ class MaskedAligner {
   /// The normal equations of the weighted difference, for any pose: see cost_at.
   void prepare(const Misalignment& misalignment, double first_gain);
   /// Cost at a pose after its best further misalignment, which goes to `x`.
-  double cost_at(const std::vector<double>& q, Vector5* x);
+  double cost_at(std::span<const double> q, Vector5* x);
   /// Where there are several DOFs, their covariance together.
   void relate(AlignedPose& pose) const;
   /// Moves a pose to the lowest cost along each DOF, then undoes its further misalignment.

@@ -108,18 +108,16 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
 
   votes_.assign(row_length_, 0.0F);
   background_.assign(count, 0.0F);
-  std::vector<std::int32_t> sorted;
-  std::vector<float> kappas;
   const auto rank = static_cast<std::size_t>(options_.background_rank);
   for (std::size_t w = 0; w < count; ++w) {
     const std::int32_t* row = scores_.data() + w * row_length_;
     const auto bests = std::span(bests_).subspan(w * shortlist.size(), shortlist.size());
     std::int32_t floor = std::numeric_limits<std::int32_t>::min();
     if (shortlist.size() > rank) {
-      sorted.assign(bests.begin(), bests.end());
-      std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1), sorted.end(),
-                       std::greater<>());
-      floor = sorted[rank - 1];
+      sorted_.assign(bests.begin(), bests.end());
+      std::nth_element(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(rank - 1),
+                       sorted_.end(), std::greater<>());
+      floor = sorted_[rank - 1];
       background_[w] = likeness(query.windows[w].energy, floor);
     }
     for (std::size_t i = 0; i < shortlist.size(); ++i) {
@@ -130,15 +128,15 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
       const std::int32_t* scores = row + offsets_[shortlist[i]];
       float* votes = votes_.data() + offsets_[shortlist[i]];
       const std::size_t candidates = object.candidates.size();
-      kappas.resize(candidates);
+      kappas_.resize(candidates);
       for (std::size_t c = 0; c < candidates; ++c) {
-        kappas[c] = likeness(query.windows[w].energy, scores[c]);
+        kappas_[c] = likeness(query.windows[w].energy, scores[c]);
       }
       for (std::size_t c = 0; c < candidates; ++c) {
-        float kappa = kappas[c];
+        float kappa = kappas_[c];
         for (const int n : object.neighbours[c]) {
           if (n >= 0) {
-            kappa = std::max(kappa, options_.pooling * kappas[static_cast<std::size_t>(n)]);
+            kappa = std::max(kappa, options_.pooling * kappas_[static_cast<std::size_t>(n)]);
           }
         }
         votes[c] += query.weights[w] * std::max(0.0F, kappa - background_[w]);
@@ -152,20 +150,21 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
     const float* best = std::max_element(votes, votes + objects_[o].candidates.size());
     result_.push_back({o, *best, static_cast<int>(best - votes)});
   }
-  std::stable_sort(result_.begin(), result_.end(),
-                   [](const PartialVote& a, const PartialVote& b) { return a.score > b.score; });
+  std::sort(result_.begin(), result_.end(), [](const PartialVote& a, const PartialVote& b) {
+    return a.score != b.score ? a.score > b.score : a.object < b.object;
+  });
   return result_;
 }
 
-std::vector<float> PartialMatcher::plain_votes(const QueryWindows& query, std::size_t object) const {
-  std::vector<float> votes(objects_[object].candidates.size(), 0.0F);
+void PartialMatcher::plain_votes(const QueryWindows& query, std::size_t object,
+                                 std::vector<float>& votes) const {
+  votes.assign(objects_[object].candidates.size(), 0.0F);
   for (std::size_t w = 0; w < query.windows.size(); ++w) {
     const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
     for (std::size_t c = 0; c < votes.size(); ++c) {
       votes[c] += query.weights[w] * likeness(query.windows[w].energy, scores[c]);
     }
   }
-  return votes;
 }
 
 void PartialMatcher::window_likeness(std::size_t object, int candidate, std::vector<float>& likeness_of,

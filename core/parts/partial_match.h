@@ -72,7 +72,7 @@ class PartialMatcher {
   std::span<const PartialVote> match(const QueryWindows& query, std::span<const std::size_t> shortlist);
 
   /// After `match`: votes without background and pooling for each candidate of one object of the shortlist.
-  [[nodiscard]] std::vector<float> plain_votes(const QueryWindows& query, std::size_t object) const;
+  void plain_votes(const QueryWindows& query, std::size_t object, std::vector<float>& votes) const;
   /// After `match`: κ of every window of the query for one candidate and its neighbours of an object of the
   /// shortlist, and the background κ of each window.
   void window_likeness(std::size_t object, int candidate, std::vector<float>& likeness,
@@ -94,6 +94,8 @@ class PartialMatcher {
   std::vector<std::int32_t> bests_;  ///< [81][shortlist]
   std::vector<float> background_;    ///< [81] κ of the background
   std::vector<float> votes_;
+  std::vector<std::int32_t> sorted_;  ///< best scores at one window
+  std::vector<float> kappas_;         ///< of one object's candidates at one window
   std::vector<PartialVote> result_;
 };
 

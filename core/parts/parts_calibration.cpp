@@ -53,6 +53,7 @@ Scores score_views(const PartsModel& model, std::size_t object, const PartsViews
   PartialMatcher matcher(model.objects, model.scale, model.voting);
   CellMap map;
   QueryWindows windows;
+  std::vector<float> votes;
   std::vector<float> likeness;
   std::vector<float> background;
   const PartsObject& parts = model.objects[object];
@@ -63,7 +64,7 @@ Scores score_views(const PartsModel& model, std::size_t object, const PartsViews
     mapper.compute(moved(views.view(v), options, random), map);
     make_query_windows(map, model.space, model.scale, model.voting, windows);
     matcher.match(windows, {&object, 1});
-    const std::vector<float> votes = matcher.plain_votes(windows, object);
+    matcher.plain_votes(windows, object, votes);
     std::array<float, 3> most{};  // votes of views at least 0, 1 and 2 steps away
     std::size_t next = 0;
     const auto& near = parts.neighbours[v];

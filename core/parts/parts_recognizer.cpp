@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/parts/masked_alignment.h"
+#include "core/parts/misalignment.h"
 
 namespace eigenpose {
 namespace {
@@ -36,21 +37,9 @@ constexpr double vote_evidence = 5.0;
 constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 
-/// The picture with a misalignment undone.
-void undo(const cv::Mat& picture, const Misalignment& m, cv::Mat& out) {
-  const double n = picture.cols;
-  const double cosine = (1.0 + m.scale) * std::cos(m.rotation);
-  const double sine = (1.0 + m.scale) * std::sin(m.rotation);
-  const double middle = 0.5 * n - 0.5;
-  const cv::Matx23d map(cosine, -sine, middle + n * m.dx - cosine * middle + sine * middle, sine, cosine,
-                        middle + n * m.dy - sine * middle - cosine * middle);
-  cv::warpAffine(picture, out, map, picture.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
-                 cv::BORDER_REPLICATE);
-}
-
 /// Votes of the learned views next to a pose: the best of those within one step in every DOF.
 double votes_near(const std::vector<float>& votes, const PartsObject& object, const PoseSpace& space,
-                  const std::vector<double>& q) {
+                  std::span<const double> q) {
   const auto axes = space.coarse_manifold().axes();
   double best = 0.0;
   for (std::size_t c = 0; c < object.candidates.size(); ++c) {
@@ -114,6 +103,9 @@ struct PartsRecognizer::Impl {
   MaskedAligner masked_aligner;
   std::vector<std::size_t> everything;
   cv::Mat picture;
+  cv::Mat numbers;  ///< of the picture, once they were asked for
+  bool numbers_made = false;
+  cv::Mat aligned_numbers;
   cv::Mat aligned;
   CellMap map;
   QueryWindows windows;  ///< of the picture, once they were asked for
@@ -121,10 +113,13 @@ struct PartsRecognizer::Impl {
   QueryWindows aligned_windows;
   PosePicture pose_picture;  ///< likewise
   bool pose_picture_made = false;
+  std::vector<float> plain_votes;    ///< of one object's views, in the picture
+  std::vector<float> aligned_votes;  ///< the same in the aligned one
   std::vector<float> likeness;
   std::vector<float> background;
 
   const PosePicture& posed();
+  const std::vector<float>& votes_of(std::size_t object);
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   double foreign_share(std::size_t object, int candidate);
   /// The same of the view with most votes.
@@ -135,8 +130,8 @@ struct PartsRecognizer::Impl {
   void refine_covered(CoveredAnswer& found, double hopeless);
   void identify_covered(std::span<const PartialVote> votes, PartsIdentification& found);
   /// The pose of a candidate, moved by the parabola through its neighbours' votes.
-  [[nodiscard]] std::vector<double> voted_pose(std::size_t object, const std::vector<float>& plain,
-                                               int candidate) const;
+  [[nodiscard]] PoseNumbers voted_pose(std::size_t object, const std::vector<float>& plain,
+                                       int candidate) const;
   [[nodiscard]] std::vector<float> pixel_trust() const;
 };
 
@@ -146,13 +141,24 @@ const PosePicture& PartsRecognizer::Impl::posed() {
   return pose_picture;
 }
 
+const std::vector<float>& PartsRecognizer::Impl::votes_of(std::size_t object) {
+  matcher.plain_votes(windows, object, plain_votes);
+  return plain_votes;
+}
+
 double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const PartsPose& pose) {
-  undo(picture, pose.misalignment, aligned);
+  if (!numbers_made) picture.convertTo(numbers, CV_32F);
+  numbers_made = true;
+  aligned_numbers.create(numbers.size(), numbers.type());
+  const std::size_t count = numbers.total() * static_cast<std::size_t>(numbers.channels());
+  undo_misalignment({numbers.ptr<float>(), count}, numbers.cols, numbers.channels(), pose.misalignment,
+                    {aligned_numbers.ptr<float>(), count});
+  aligned_numbers.convertTo(aligned, CV_8U);
   mapper.compute(aligned, map);
   make_query_windows(map, model.space, model.scale, model.voting, aligned_windows);
   rematcher.match(aligned_windows, {&object, 1});
-  return votes_near(rematcher.plain_votes(aligned_windows, object), model.objects[object],
-                    model.poses[object], pose.q) /
+  rematcher.plain_votes(aligned_windows, object, aligned_votes);
+  return votes_near(aligned_votes, model.objects[object], model.poses[object], pose.q) /
          aligned_windows.total_weight;
 }
 
@@ -218,10 +224,10 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
                    0.0};
     pose.votes = votes_near(plain, parts, space, pose.q) / windows.total_weight;
     pose.merit = merit(pose);
-    answer.poses.push_back(std::move(pose));
+    answer.poses.push_back(pose);
   }
   const auto better = [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; };
-  std::stable_sort(answer.poses.begin(), answer.poses.end(), better);
+  sort_few(answer.poses, better);
   const double best = answer.poses.front().merit;
   for (std::size_t i = 0; i < std::min(answer.poses.size(), most_revoted); ++i) {
     PartsPose& pose = answer.poses[i];
@@ -233,15 +239,16 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
     pose.votes = 0.5 * (pose.votes + share);
     pose.merit = merit(pose);
   }
-  std::stable_sort(answer.poses.begin(), answer.poses.end(), better);
+  sort_few(answer.poses, better);
   return answer;
 }
 
-std::vector<double> PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
-                                                      int candidate) const {
+PoseNumbers PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
+                                              int candidate) const {
   const PartsObject& parts = model.objects[object];
   const auto axes = model.poses[object].coarse_manifold().axes();
-  std::vector<double> q(axes.size());
+  PoseNumbers q;
+  q.resize(axes.size());
   std::size_t rest = static_cast<std::size_t>(parts.candidates[static_cast<std::size_t>(candidate)].view);
   for (std::size_t a = axes.size(); a-- > 0;) {
     q[a] = axes[a].samples[rest % axes[a].samples.size()];
@@ -290,7 +297,7 @@ CoveredAnswer PartsRecognizer::Impl::approach_covered(std::size_t object, const 
                        plain[static_cast<std::size_t>(peak)] / windows.total_weight, 0.0};
     start.merit =
         vote_merit * start.votes - visible_merit * std::log(std::max(start.pose.aligned.cost, model.noise));
-    found.starts.push_back(std::move(start));
+    found.starts.push_back(start);
   }
   std::ranges::stable_sort(found.starts, std::greater<>(), &CoveredStart::merit);
   return found;
@@ -309,7 +316,7 @@ void PartsRecognizer::Impl::refine_covered(CoveredAnswer& found, double hopeless
                          unexplained_merit * start.pose.unexplained;
     answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit});
   }
-  std::ranges::stable_sort(answer.poses, std::greater<>(), &PartsPose::merit);
+  sort_few(answer.poses, [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
   if (!answer.poses.empty()) answer.score = 1.0 - answer.poses.front().votes;
 }
 
@@ -325,6 +332,7 @@ void PartsRecognizer::look(const cv::Mat& picture) {
     cv::resize(picture, impl_->picture, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
   }
   impl_->windows_made = false;
+  impl_->numbers_made = false;
   impl_->pose_picture_made = false;
 }
 
@@ -344,25 +352,25 @@ std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> 
 }
 
 double PartsRecognizer::share_of(std::size_t object) const {
-  const std::vector<float> plain = impl_->matcher.plain_votes(impl_->windows, object);
+  const std::vector<float>& plain = impl_->votes_of(object);
   return static_cast<double>(*std::ranges::max_element(plain) / impl_->windows.total_weight);
 }
 
 PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   Impl& impl = *impl_;
-  const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, object);
+  const std::vector<float>& plain = impl.votes_of(object);
   const double share = impl.covered_share(object, plain);
   if (!covered && share <= impl.model.calibration[object].covered_share)
     return impl.find_poses(object, plain, share);
   CoveredAnswer found = impl.approach_covered(object, plain, share);
   impl.refine_covered(found, found.starts.front().merit - hopeless_merit);
-  return std::move(found.answer);
+  return found.answer;
 }
 
 void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes, PartsIdentification& found) {
   std::vector<CoveredAnswer> rivals;
   const auto approach = [&](const PartialVote& vote) {
-    const std::vector<float> plain = matcher.plain_votes(windows, vote.object);
+    const std::vector<float>& plain = votes_of(vote.object);
     rivals.push_back(approach_covered(vote.object, plain, covered_share(vote.object, plain)));
   };
   for (std::size_t i = 0; i < std::min(most_rivals, votes.size()); ++i) {
@@ -390,15 +398,15 @@ void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes,
   const auto ranked = std::span(rivals).first(contenders);
   std::ranges::stable_sort(ranked, std::greater<>(),
                            [](const CoveredAnswer& rival) { return rival.answer.poses.front().merit; });
-  found.best = std::move(rivals[0].answer);
-  if (rivals.size() > 1) found.second = std::move(rivals[1].answer);
+  found.best = rivals[0].answer;
+  if (rivals.size() > 1) found.second = rivals[1].answer;
 }
 
 PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist, bool covered) {
   Impl& impl = *impl_;
   const auto votes = vote(shortlist);
   const std::size_t first = votes[0].object;
-  const std::vector<float> plain = impl.matcher.plain_votes(impl.windows, first);
+  const std::vector<float>& plain = impl.votes_of(first);
   const double share = impl.covered_share(first, plain);
   covered = covered || share > impl.model.calibration[first].covered_share;
   PartsIdentification found;

@@ -15,8 +15,8 @@ namespace eigenpose {
 
 /// One object and pose that windows and alignment agree on.
 struct PartsPose {
-  std::vector<double> q;
-  std::vector<double> q_covariance;  ///< m × m, row by row; infinite where a DOF cannot be seen
+  PoseNumbers q;
+  PoseSquare q_covariance;  ///< infinite where a DOF cannot be seen
   Misalignment misalignment;
   double cost = 0.0;   ///< squared distance in the pose space after alignment
   double votes = 0.0;  ///< share of the windows' weight that votes for this pose, 0…1
@@ -27,9 +27,9 @@ struct PartsPose {
 /// The answer for one region.
 struct PartsAnswer {
   std::size_t object = 0;
-  std::vector<PartsPose> poses;  ///< of `object`, best first, never empty
-  double score = 1.0;            ///< 1 − votes of the best pose; compare with the object's rejection score
-  double covered = 0.0;          ///< share of the windows' weight that does not belong to the object, 0…1
+  BoundedVector<PartsPose, most_poses> poses;  ///< of `object`, best first, never empty
+  double score = 1.0;    ///< 1 − votes of the best pose; compare with the object's rejection score
+  double covered = 0.0;  ///< share of the windows' weight that does not belong to the object, 0…1
 };
 
 /// Which object the windows show.

@@ -55,15 +55,50 @@ struct Sampler {
   }
 };
 
+using Brightness = std::array<float, std::size_t{PosePicture::side} * PosePicture::side>;
+
+/// Gaussian of σ = coarse_blur; beyond its edge the picture goes on as it ends.
+void blur(const Brightness& in, Brightness& out) {
+  constexpr int n = PosePicture::side;
+  constexpr int reach = 4;
+  std::array<float, 2 * reach + 1> kernel;
+  float sum = 0.0F;
+  for (int k = -reach; k <= reach; ++k)
+    sum += kernel[static_cast<std::size_t>(k + reach)] =
+        static_cast<float>(std::exp(-0.5 * k * k / (coarse_blur * coarse_blur)));
+  for (float& weight : kernel) weight /= sum;
+  Brightness across;
+  std::array<float, n + 2 * reach> row;
+  for (int r = 0; r < n; ++r) {
+    const float* from = in.data() + r * n;
+    std::copy_n(from, n, row.data() + reach);
+    std::fill_n(row.data(), reach, from[0]);
+    std::fill_n(row.data() + reach + n, reach, from[n - 1]);
+    float* to = across.data() + r * n;
+    std::fill_n(to, n, 0.0F);
+    for (std::size_t k = 0; k < kernel.size(); ++k)
+      for (int c = 0; c < n; ++c) to[c] += kernel[k] * row[static_cast<std::size_t>(c) + k];
+  }
+  for (int r = 0; r < n; ++r) {
+    float* to = out.data() + r * n;
+    std::fill_n(to, n, 0.0F);
+    for (int k = -reach; k <= reach; ++k) {
+      const float* from = across.data() + std::clamp(r + k, 0, n - 1) * n;
+      const float weight = kernel[static_cast<std::size_t>(k + reach)];
+      for (int c = 0; c < n; ++c) to[c] += weight * from[c];
+    }
+  }
+}
+
 /// Texels of a 64×64 picture.
-void fill_texels(const cv::Mat& picture, std::vector<float>& texels) {
+void fill_texels(const Brightness& picture, std::vector<float>& texels) {
   constexpr int n = PosePicture::side;
   texels.resize(static_cast<std::size_t>(n) * n * 4);
   float* out = texels.data();
   for (int r = 0; r < n; ++r) {
-    const float* here = picture.ptr<float>(r);
-    const float* above = picture.ptr<float>(std::max(r - 1, 0));
-    const float* below = picture.ptr<float>(std::min(r + 1, n - 1));
+    const float* here = picture.data() + r * n;
+    const float* above = picture.data() + std::max(r - 1, 0) * n;
+    const float* below = picture.data() + std::min(r + 1, n - 1) * n;
     for (int c = 0; c < n; ++c, out += 4) {
       out[0] = here[c];
       out[1] = 0.5F * (here[std::min(c + 1, n - 1)] - here[std::max(c - 1, 0)]);
@@ -99,19 +134,20 @@ void span_of(const Eigen::MatrixXf& pictures, int side, PoseScale& scale, Eigen:
 
 void make_pose_picture(const cv::Mat& picture, PosePicture& out) {
   constexpr int n = PosePicture::side;
-  cv::Mat grey;
-  if (picture.channels() == 3) {
-    cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
-  } else {
-    grey = picture;
+  const cv::Mat* source = &picture;
+  cv::Mat resized;
+  if (picture.rows != n || picture.cols != n) {
+    cv::resize(picture, resized, cv::Size(n, n), 0.0, 0.0, cv::INTER_AREA);
+    source = &resized;
   }
-  if (grey.rows != n || grey.cols != n) {
-    cv::resize(grey, grey, cv::Size(n, n), 0.0, 0.0, cv::INTER_AREA);
-  }
-  cv::Mat sharp;
-  grey.convertTo(sharp, CV_32F, 1.0 / 255.0);
-  cv::Mat blurred;
-  cv::GaussianBlur(sharp, blurred, cv::Size(9, 9), coarse_blur, coarse_blur, cv::BORDER_REPLICATE);
+  // On the stack: once a frame, no memory is taken.
+  std::array<std::uint8_t, std::size_t{n} * n> bytes;
+  cv::Mat grey(n, n, CV_8UC1, bytes.data());
+  source->channels() == 3 ? cv::cvtColor(*source, grey, cv::COLOR_BGR2GRAY) : source->copyTo(grey);
+  Brightness sharp;
+  for (std::size_t i = 0; i < sharp.size(); ++i) sharp[i] = static_cast<float>(bytes[i]) * (1.0F / 255.0F);
+  Brightness blurred;
+  blur(sharp, blurred);
   fill_texels(sharp, out.sharp);
   fill_texels(blurred, out.blurred);
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace eigenpose {
 
@@ -35,6 +36,37 @@ void Outcome::set_covariance(std::span<const double> covariance, double scale,
     }
     q_sigma.push_back(std::sqrt(q_covariance[a * m + a]));
   }
+}
+
+void HypothesisPool::fill(std::optional<Hypothesis>& hypothesis, const std::string& object,
+                          std::span<const double> q, double distance) {
+  if (!hypothesis && !spare_.empty()) {
+    hypothesis = std::move(spare_.back());
+    spare_.pop_back();
+  }
+  if (!hypothesis) hypothesis.emplace();
+  hypothesis->object = object;
+  hypothesis->q.assign(q.begin(), q.end());
+  hypothesis->distance = distance;
+}
+
+void HypothesisPool::give_back(std::optional<Hypothesis>& hypothesis) {
+  if (!hypothesis) return;
+  spare_.push_back(std::move(*hypothesis));
+  hypothesis.reset();
+}
+
+void HypothesisPool::clear(Outcome& outcome) {
+  outcome.verdict = Verdict::unknown;
+  outcome.box = {};
+  give_back(outcome.best);
+  give_back(outcome.runner_up);
+  give_back(outcome.other_pose);
+  outcome.q_sigma.clear();
+  outcome.q_covariance.clear();
+  outcome.rejection_distance = 0.0;
+  outcome.covered_share = 0.0;
+  outcome.confidence = 0.0;
 }
 
 std::vector<std::vector<double>> covariance_rows(const Outcome& outcome) {

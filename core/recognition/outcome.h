@@ -58,6 +58,19 @@ struct Outcome {
   void set_covariance(std::span<const double> covariance, double scale, const std::vector<bool>& observable);
 };
 
+/// Hypotheses taken out of outcomes, with their memory, for the next frame's.
+class HypothesisPool {
+ public:
+  void fill(std::optional<Hypothesis>& hypothesis, const std::string& object, std::span<const double> q,
+            double distance);
+  void give_back(std::optional<Hypothesis>& hypothesis);
+  /// Makes `outcome` that of a region of which nothing is known.
+  void clear(Outcome& outcome);
+
+ private:
+  std::vector<Hypothesis> spare_;
+};
+
 /// q_covariance, one list a row.
 std::vector<std::vector<double>> covariance_rows(const Outcome& outcome);
 

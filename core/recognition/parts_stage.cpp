@@ -28,8 +28,9 @@ double reach_of_others(const Model& model) {
 
 }  // namespace
 
-PartsStage::PartsStage(const Model& model, const ManifoldSearch& search)
+PartsStage::PartsStage(const Model& model, const ManifoldSearch& search, HypothesisPool& pool)
     : model_(model),
+      pool_(pool),
       recognizer_(*model.parts),
       match_(model, search, reach_of_others(model)),
       fused_(model.normalization, *model.parts, recognizer_),
@@ -78,7 +79,7 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
     pose.merit = -0.5 * pose.cost / model_.parts->noise;
     if (!poses_.empty() && apart(object, pose.q, poses_.front().q))
       clear = clear && pose.merit < poses_.front().merit - sure_pose;
-    poses_.push_back(std::move(pose));
+    poses_.push_back(pose);
   }
   if (clear) {
     finding.poses = poses_;
@@ -130,25 +131,23 @@ void PartsStage::describe(const PartsIdentification& found, const RealignedDista
   finding.tie = found.tie;
   describe(finding, accepted, outcome);
   if (found.second) {
-    outcome.runner_up = {model_.objects[found.second->object].name, found.second->poses.front().q,
-                         distance_of(picture, *found.second).own};
+    pool_.fill(outcome.runner_up, model_.objects[found.second->object].name, found.second->poses.front().q,
+               distance_of(picture, *found.second).own);
   }
 }
 
-void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcome) const {
+void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcome) {
   const ModelObject& object = model_.objects[finding.object];
   const PartsCalibration& calibration = model_.parts->calibration[finding.object];
   const PartsPose& best = finding.poses.front();
-  outcome.best = {object.name, best.q, finding.distance.own};
+  pool_.fill(outcome.best, object.name, best.q, finding.distance.own);
   outcome.rejection_distance = calibration.rejection_distance;
   outcome.covered_share = finding.covered;
   outcome.set_covariance(best.q_covariance, sigma_inflation * sigma_inflation, object.dof_observable);
   if (const auto& other = finding.distance.other) {
     const ModelObject& second = model_.objects[other->manifold];
-    outcome.runner_up = {
-        second.name,
-        {other->q.begin(), other->q.begin() + static_cast<std::ptrdiff_t>(second.workspace.size())},
-        other->distance};
+    pool_.fill(outcome.runner_up, second.name, std::span(other->q).first(second.workspace.size()),
+               other->distance);
   }
   if (!accepted) {
     outcome.verdict = Verdict::unknown;
@@ -168,7 +167,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
   }
   for (const PartsPose& pose : finding.poses.subspan(1)) {
     if (pose.merit > best.merit - likely_pose && apart(finding.object, pose.q, best.q)) {
-      outcome.other_pose = {object.name, pose.q, finding.distance.own};
+      pool_.fill(outcome.other_pose, object.name, pose.q, finding.distance.own);
       break;
     }
   }

@@ -24,8 +24,8 @@ inline constexpr double poses_apart = 1.0 / 12.0;
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
  public:
-  /// @pre model.parts is set. The model and `search`, over its manifolds, outlive the stage.
-  PartsStage(const Model& model, const ManifoldSearch& search);
+  /// @pre model.parts is set. The model, `search`, over its manifolds, and the pool outlive the stage.
+  PartsStage(const Model& model, const ManifoldSearch& search, HypothesisPool& pool);
 
   /// Fills everything of `outcome` but its box.
   /// @param picture as the normaliser makes it. @param nearest the object whose manifold is nearest.
@@ -60,13 +60,14 @@ class PartsStage {
   std::size_t vote(std::span<const float> picture, Outcome& outcome);
   void describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
                 std::span<const float> picture, Outcome& outcome);
-  void describe(const Finding& finding, bool accepted, Outcome& outcome) const;
+  void describe(const Finding& finding, bool accepted, Outcome& outcome);
   /// Distance once a pose of the answer's object is undone, the best one.
   RealignedDistance distance_of(std::span<const float> picture, const PartsAnswer& answer);
   [[nodiscard]] bool accepted(const PartsIdentification& found, const RealignedDistance& distance) const;
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 
   const Model& model_;
+  HypothesisPool& pool_;
   PartsRecognizer recognizer_;
   AlignedMatch match_;
   FusedRegion fused_;

@@ -42,15 +42,13 @@ PoseTable::PoseTable(const Manifold& manifold) {
   squared_.resize(static_cast<Eigen::Index>(samples));
   const std::size_t m = axes_.size();
   covariance_.reserve(samples * m * m);
-  std::vector<double> covariance;
   std::vector<double> q(axes_.size());
   for (std::size_t s = 0; s < samples; ++s) {
     for (std::size_t d = 0; d < axes_.size(); ++d) q[d] = value(s, axes_[d]);
     const ManifoldPoint point = manifold.evaluate_with_jacobian(q);
     points_.col(static_cast<Eigen::Index>(s)) = point.value.cast<float>();
-    covariance = unseen_pose(m);
-    set_covariance(point.jacobian.transpose() * point.jacobian, 1.0, covariance);
-    covariance_.insert(covariance_.end(), covariance.begin(), covariance.end());
+    covariance_.resize(covariance_.size() + m * m);
+    set_covariance(point.jacobian.transpose() * point.jacobian, 1.0, std::span(covariance_).last(m * m));
   }
 }
 

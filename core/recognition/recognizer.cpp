@@ -88,7 +88,7 @@ struct Recognizer::Impl {
   Region whole;
   std::vector<Outcome> outcomes;
   std::size_t outcome_count = 0;
-  std::vector<Hypothesis> spare;  ///< hypotheses taken out of outcomes, with their memory
+  HypothesisPool pool;
 
   std::span<const Region> find_regions(const cv::Mat& image);
   [[nodiscard]] bool too_small(const Region& region) const;
@@ -107,8 +107,6 @@ struct Recognizer::Impl {
   void estimate_pose(Outcome& outcome, const ClosestPoint& best);
 
   Outcome& next_outcome();
-  Hypothesis take_spare();
-  void give_back(std::optional<Hypothesis>& hypothesis);
   void describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found);
 };
 
@@ -130,7 +128,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
     search_bound = std::max(search_bound, search_reach * object.rejection_distance);
   if (options.rejector && search_bound > 0.0)
     rejector = std::make_unique<RejectionSearch>(manifolds, RejectorOptions{.distance = search_bound});
-  if (model->parts) parts.emplace(*model, *search);
+  if (model->parts) parts.emplace(*model, *search, pool);
 }
 
 std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
@@ -217,10 +215,7 @@ void Recognizer::Impl::judge(Outcome& outcome) {
   const std::span<double> q(other_q.data(), object.workspace.size());
   const auto other = poses[best.manifold].other_minimum(point, outcome.best->q, poses_apart, q);
   if (other && is_ambiguous(beside(std::max(best.distance, other->distance)))) {
-    outcome.other_pose = take_spare();
-    outcome.other_pose->object = object.name;
-    outcome.other_pose->q.assign(q.begin(), q.end());
-    outcome.other_pose->distance = other->distance;
+    pool.fill(outcome.other_pose, object.name, q, other->distance);
   }
 }
 
@@ -250,38 +245,13 @@ void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best)
 Outcome& Recognizer::Impl::next_outcome() {
   if (outcome_count == outcomes.size()) outcomes.emplace_back();
   Outcome& outcome = outcomes[outcome_count++];
-  outcome.verdict = Verdict::unknown;
-  give_back(outcome.best);
-  give_back(outcome.runner_up);
-  give_back(outcome.other_pose);
-  outcome.q_sigma.clear();
-  outcome.q_covariance.clear();
-  outcome.rejection_distance = 0.0;
-  outcome.covered_share = 0.0;
-  outcome.confidence = 0.0;
+  pool.clear(outcome);
   return outcome;
-}
-
-Hypothesis Recognizer::Impl::take_spare() {
-  if (spare.empty()) return {};
-  Hypothesis taken = std::move(spare.back());
-  spare.pop_back();
-  return taken;
-}
-
-void Recognizer::Impl::give_back(std::optional<Hypothesis>& hypothesis) {
-  if (!hypothesis) return;
-  spare.push_back(std::move(*hypothesis));
-  hypothesis.reset();
 }
 
 void Recognizer::Impl::describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found) {
   const ModelObject& object = model->objects[found.manifold];
-  hypothesis = take_spare();
-  hypothesis->object = object.name;
-  hypothesis->q.assign(found.q.begin(),
-                       found.q.begin() + static_cast<std::ptrdiff_t>(object.workspace.size()));
-  hypothesis->distance = found.distance;
+  pool.fill(hypothesis, object.name, std::span(found.q).first(object.workspace.size()), found.distance);
 }
 
 Recognizer::Recognizer(std::shared_ptr<const Model> model, const RecognizerOptions& options) {

@@ -40,7 +40,9 @@ TEST(PoseCovariance, IsInfiniteWhereNothingIsSeen) {
   EXPECT_NEAR(covariance[0], 0.25, 1e-12);
   EXPECT_EQ(covariance[1], 0.0);
   EXPECT_TRUE(std::isinf(covariance[3]));
-  EXPECT_TRUE(std::isinf(unseen_pose(3)[8]));
+  std::array<double, 9> unseen{};
+  set_unseen(3, unseen);
+  EXPECT_TRUE(std::isinf(unseen[8]));
 }
 
 }  // namespace
