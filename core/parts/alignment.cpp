@@ -13,6 +13,9 @@
 namespace eigenpose {
 namespace {
 
+/// Rounds after which the tangents stay as they are.
+constexpr int tangent_rounds = 2;
+
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 
 Vector5 as_vector(const Misalignment& m) {
@@ -63,12 +66,20 @@ void PoseAligner::project(const PoseSpace& space, const PoseScale& scale, const 
                           static_cast<int>(dimensions_), warped.data(), projected_.data(),
                           static_cast<int>(dimensions_));
   Eigen::Map<Eigen::VectorXf>(projected_.data(), dimensions_) -= scale.mean;
-  prepare(p);
+  prepare();
+  set_prior(p);
 }
 
-void PoseAligner::prepare(const Misalignment& p) {
-  const Vector5 undone = as_vector(p);
-  const Vector5 pull = options_.noise * precision_.cwiseProduct(undone);
+void PoseAligner::project_picture(const PoseSpace& space, const PosePicture& picture, const Misalignment& p) {
+  const PoseScale& scale = space.coarse();
+  scale.warp(picture, p, false, coarse_warped_);
+  multiply_transposed(scale.basis.data(), static_cast<int>(scale.basis.rows()), static_cast<int>(dimensions_),
+                      coarse_warped_.data(), projected_.data());
+  Eigen::Map<Eigen::VectorXf>(projected_.data(), dimensions_) -= scale.mean;
+  set_prior(p);
+}
+
+void PoseAligner::prepare() {
   Eigen::Matrix<double, 5, 5> normal;
   const auto columns = tangents();
   for (Eigen::Index i = 0; i < normal.rows(); ++i)
@@ -76,8 +87,12 @@ void PoseAligner::prepare(const Misalignment& p) {
       normal(i, j) = normal(j, i) = columns.col(i).cast<double>().dot(columns.col(j).cast<double>());
   normal.diagonal() += options_.noise * precision_;
   inverse_ = normal.inverse();
-  prior_pull_ = pull;
-  prior_cost_ = undone.dot(pull);
+}
+
+void PoseAligner::set_prior(const Misalignment& p) {
+  const Vector5 undone = as_vector(p);
+  prior_pull_ = options_.noise * precision_.cwiseProduct(undone);
+  prior_cost_ = undone.dot(prior_pull_);
 }
 
 double PoseAligner::cost_at(const float* point, Vector5* x) const {
@@ -104,7 +119,16 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
   Vector5 x;
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < options_.rounds; ++round) {
-    project(space, space.coarse(), picture, p);
+    if (round == 0) {
+      projected_ = unmoved_;
+      dimensions_ = space.coarse().basis.cols();
+      inverse_ = unmoved_inverse_;
+      set_prior(p);
+    } else if (round < tangent_rounds) {
+      project(space, space.coarse(), picture, p);
+    } else {
+      project_picture(space, picture, p);
+    }
     // Coordinate-wise descent over the grid within reach: exact for one DOF.
     std::size_t found = here;
     double lowest = cost_at(space.samples().col(static_cast<Eigen::Index>(here)).data(), nullptr);
@@ -191,6 +215,8 @@ double PoseAligner::fine_cost(const PosePicture& picture, const PoseSpace& space
 
 const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, const PoseSpace& space) {
   project(space, space.coarse(), picture, {});
+  unmoved_ = projected_;
+  unmoved_inverse_ = inverse_;
   const auto total = static_cast<std::size_t>(space.samples().cols());
   costs_.resize(total);
   for (std::size_t t = 0; t < total; ++t) {

@@ -69,7 +69,11 @@ class PoseAligner {
  private:
   void project(const PoseSpace& space, const PoseScale& scale, const PosePicture& picture,
                const Misalignment& p);
-  void prepare(const Misalignment& p);
+  /// The same picture again, moved a little more: J stays, as it hardly changes any more.
+  void project_picture(const PoseSpace& space, const PosePicture& picture, const Misalignment& p);
+  /// The normal equations of J.
+  void prepare();
+  void set_prior(const Misalignment& p);
   /// J, D × 5.
   [[nodiscard]] Eigen::Map<const Eigen::MatrixXf> tangents() const {
     return {projected_.data() + dimensions_, dimensions_, Misalignment::unknowns};
@@ -84,10 +88,12 @@ class PoseAligner {
 
   AlignmentOptions options_;
   Eigen::Matrix<double, 5, 1> precision_;
-  Eigen::MatrixXf coarse_warped_;  ///< pixels × 6
+  Eigen::MatrixXf coarse_warped_;  ///< pixels × 6; J apart, that of the last projection with it
   Eigen::MatrixXf fine_warped_;
   Eigen::Index dimensions_ = 0;   ///< D
   std::vector<float> projected_;  ///< D × 6: f, then J
+  std::vector<float> unmoved_;    ///< the same of the picture as it is, coarse scale
+  Eigen::Matrix<double, 5, 5> unmoved_inverse_;
   Eigen::VectorXd fine_point_;
   std::vector<float> fine_numbers_;
   Eigen::Matrix<double, 5, 5> inverse_;

@@ -33,6 +33,8 @@ constexpr double least_growth = 2.0;
 constexpr double most_growth = 64.0;
 /// Of new views, so many show what could not be seen coming at the step before.
 constexpr double sudden_share = 0.02;
+/// Moved views that say enough of all objects together.
+constexpr std::size_t most_moved = 4000;
 constexpr double most_sure_ratio = 0.3;
 constexpr double sure_margin = 0.8;
 
@@ -134,7 +136,7 @@ Misalignment random_misalignment(const MatchCalibrationOptions& options, std::mt
 /// Moves, aligns and measures every view of one object.
 std::vector<Probe> probe_object(const Model& model, const ViewStore& views, const Eigen::MatrixXd& all_points,
                                 std::size_t o, const ManifoldSearch& search,
-                                const MatchCalibrationOptions& options) {
+                                const MatchCalibrationOptions& options, std::size_t copies) {
   const ObjectViews& object = views.objects()[o];
   const Eigen::MatrixXd points =
       all_points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count));
@@ -153,7 +155,7 @@ std::vector<Probe> probe_object(const Model& model, const ViewStore& views, cons
   std::vector<Probe> probes;
   for (std::size_t v = 0; v < object.count; ++v) {
     picture_numbers(views.picture(object.first + v), view);
-    for (std::size_t copy = 0; copy < options.moved_views; ++copy) {
+    for (std::size_t copy = 0; copy < copies; ++copy) {
       undo_misalignment(view, size, bands, random_misalignment(options, random), moved);
       quantize(moved, bytes);
       make_pose_picture(cv::Mat(size, size, CV_8UC(bands), bytes.data()), picture);
@@ -291,6 +293,7 @@ std::vector<MatchEvidence> measure_match(const Model& model, const ViewStore& vi
                                 ", allowed are 0 to 0.5; that of accepted strangers is " +
                                 std::to_string(options.stranger_rate) + ", allowed are 0 to 1");
   if (options.moved_views < 1) throw std::invalid_argument("calibration needs at least one moved view");
+  const std::size_t copies = std::clamp<std::size_t>(most_moved / views.count(), 1, options.moved_views);
   std::vector<Manifold> manifolds;
   for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
   const auto search = make_search("tree", manifolds);
@@ -299,19 +302,23 @@ std::vector<MatchEvidence> measure_match(const Model& model, const ViewStore& vi
   std::size_t done = 0;  // guarded by progress_mutex
   parallel_for(manifolds.size(), options.threads, [&](std::size_t o) {
     if (stop.stop_requested()) throw Interrupted();
-    probes[o] = probe_object(model, views, points, o, *search, options);
+    probes[o] = probe_object(model, views, points, o, *search, options, copies);
     const std::lock_guard lock(progress_mutex);
     if (progress) progress({"calibrating", ++done, manifolds.size()});
   });
   const Growth growth = error_growth(probes);
   std::vector<MatchEvidence> evidence;
   evidence.reserve(probes.size());
-  for (const auto& own : probes) evidence.push_back(weigh(own, growth));
+  for (std::size_t o = 0; o < probes.size(); ++o) {
+    evidence.push_back(weigh(probes[o], growth));
+    evidence.back().views = views.objects()[o].count;
+  }
   return evidence;
 }
 
 MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
                                  const MatchCalibrationOptions& options, std::optional<std::size_t> without) {
+  std::size_t views = 0;
   std::vector<double> factors;
   std::vector<double> others;
   MatchThresholds result;
@@ -319,6 +326,7 @@ MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
   for (std::size_t o = 0; o < evidence.size(); ++o) {
     if (o == without) continue;
     const MatchEvidence& own = evidence[o];
+    views += own.views;
     factors.insert(factors.end(), own.factors.begin(), own.factors.end());
     others.insert(others.end(), own.others.begin(), own.others.end());
     result.sure_ratio = std::min(result.sure_ratio, sure_margin * own.false_lead);
@@ -326,7 +334,6 @@ MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
   if (factors.empty()) factors.push_back(1.0);
   std::sort(factors.begin(), factors.end());
   std::sort(others.begin(), others.end());
-  const std::size_t views = others.size() / options.moved_views;
   result.smallest_rate = 1.0 / (static_cast<double>(views) + 1.0);
   const double rate = std::max(options.rate, result.smallest_rate);
   const auto nearest = static_cast<std::size_t>(options.stranger_rate * static_cast<double>(others.size()));

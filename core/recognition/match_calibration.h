@@ -28,12 +28,13 @@ struct MatchCalibrationOptions {
   double shift = 2.0 / 128.0;    ///< of the side of the appearance, each way
   double scale = 0.03;           ///< each way
   double turn_deg = 3.0;         ///< in the picture's plane, each way
-  std::size_t moved_views = 2;   ///< of every learned view
+  std::size_t moved_views = 2;   ///< of every learned view; fewer, but one, where they are thousands
   unsigned threads = 0;
 };
 
 /// What the moved views of one object show.
 struct MatchEvidence {
+  std::size_t views = 0;          ///< of which each was moved once or more
   double scale = 0.0;             ///< in which its distances are measured
   double typical_distance = 0.0;  ///< root mean square expected of new views
   std::vector<double> learned;    ///< squared distance of each view to the manifold that knows it

@@ -21,6 +21,8 @@ namespace {
 /// guessing gives a quarter of the range in the median; half a turn wrong every second time gives about as
 /// much.
 constexpr double observable_error_share = 0.12;
+/// Moved views that say enough of all objects together.
+constexpr std::size_t most_moved = 4000;
 
 double quantile(std::vector<double> values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size() - 1)));
@@ -54,10 +56,11 @@ cv::Mat moved(const cv::Mat& view, const RejectionOptions& options, std::mt19937
 std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& object,
                                     const Eigenspace& eigenspace, const ManifoldSearch& search,
                                     const RejectionOptions& options, std::uint32_t seed) {
+  const std::size_t copies = std::clamp<std::size_t>(most_moved / views.count(), 1, options.moved_views);
   std::mt19937 random(seed);
   const Eigen::Index length = eigenspace.length();
   const Eigen::VectorXf offset = eigenspace.basis.transpose() * eigenspace.mean;
-  Eigen::MatrixXf tile(length, static_cast<Eigen::Index>(options.moved_views));
+  Eigen::MatrixXf tile(length, static_cast<Eigen::Index>(copies));
   std::vector<double> distances;
   AppearanceMaker maker(views.normalization());
   std::vector<float> numbers(picture_length(views.normalization()));

@@ -18,6 +18,7 @@ std::vector<MatchEvidence> even_evidence(std::size_t objects, double scale, doub
     own.scale = scale;
     own.typical_distance = scale;
     own.growth = 4.0;
+    own.views = 100;
     own.missed = 4.0 * scale * scale;
     for (int i = 1; i <= 100; ++i) {
       own.learned.push_back(1e-6 * i);
@@ -28,10 +29,9 @@ std::vector<MatchEvidence> even_evidence(std::size_t objects, double scale, doub
   return evidence;
 }
 
-MatchCalibrationOptions one_probe(double rate) {
+MatchCalibrationOptions at_rate(double rate) {
   MatchCalibrationOptions options;
   options.rate = rate;
-  options.moved_views = 1;
   return options;
 }
 
@@ -39,7 +39,7 @@ TEST(MatchThresholds, HoldTheRateThatIsAskedFor) {
   auto evidence = even_evidence(10, 0.02, 9.0);
   evidence[3].missed *= 4.0;  // one whose views are worth less
   for (const double rate : {0.01, 0.05, 0.2}) {
-    const MatchThresholds found = match_thresholds(evidence, one_probe(rate));
+    const MatchThresholds found = match_thresholds(evidence, at_rate(rate));
     for (std::size_t o = 0; o < evidence.size(); ++o) {
       std::size_t beyond = 0;
       for (const double learned : evidence[o].learned)
@@ -53,29 +53,30 @@ TEST(MatchThresholds, HoldTheRateThatIsAskedFor) {
 
 TEST(MatchThresholds, SayTheSmallestRateThatTheViewsSupport) {
   const auto evidence = even_evidence(3, 0.02, 9.0);
-  const MatchThresholds found = match_thresholds(evidence, one_probe(0.0));
+  const MatchThresholds found = match_thresholds(evidence, at_rate(0.0));
   EXPECT_DOUBLE_EQ(found.smallest_rate, 1.0 / 301.0);
   EXPECT_DOUBLE_EQ(found.rejection_distance[0],
-                   match_thresholds(evidence, one_probe(1.0 / 301.0)).rejection_distance[0]);
+                   match_thresholds(evidence, at_rate(1.0 / 301.0)).rejection_distance[0]);
 }
 
 TEST(MatchThresholds, LeaveRoomToObjectsOfOneView) {
   // Of a single view it is not known what the spline misses.
   std::vector<MatchEvidence> evidence(2);
   for (MatchEvidence& own : evidence) {
+    own.views = 1;
     own.scale = 0.02;
     own.missed = 4e-4;
     own.learned = {4e-4};
     own.others = {1.0};
   }
-  EXPECT_NEAR(match_thresholds(evidence, one_probe(0.001)).rejection_distance[0], std::sqrt(8e-4), 1e-6);
+  EXPECT_NEAR(match_thresholds(evidence, at_rate(0.001)).rejection_distance[0], std::sqrt(8e-4), 1e-6);
 }
 
 TEST(MatchThresholds, StayBelowTheDistanceOfOtherObjects) {
-  const MatchThresholds found = match_thresholds(even_evidence(3, 0.02, 0.03), one_probe(0.001));
+  const MatchThresholds found = match_thresholds(even_evidence(3, 0.02, 0.03), at_rate(0.001));
   for (const double distance : found.rejection_distance) EXPECT_DOUBLE_EQ(distance, 0.03);
   // However near the others are, what its own views need on average is left to an object.
-  EXPECT_DOUBLE_EQ(match_thresholds(even_evidence(3, 0.02, 0.001), one_probe(0.001)).rejection_distance[0],
+  EXPECT_DOUBLE_EQ(match_thresholds(even_evidence(3, 0.02, 0.001), at_rate(0.001)).rejection_distance[0],
                    0.02);
 }
 
@@ -84,9 +85,9 @@ TEST(MatchThresholds, UseNothingOfAnObjectThatIsLeftOut) {
   evidence[1].others.assign(100, 0.03);
   evidence[1].factors.assign(100, 50.0);
   evidence[1].false_lead = 0.01;
-  const MatchThresholds without = match_thresholds(evidence, one_probe(0.001), 1);
+  const MatchThresholds without = match_thresholds(evidence, at_rate(0.001), 1);
   evidence.erase(evidence.begin() + 1);
-  const MatchThresholds never = match_thresholds(evidence, one_probe(0.001));
+  const MatchThresholds never = match_thresholds(evidence, at_rate(0.001));
   EXPECT_DOUBLE_EQ(without.rejection_distance[0], never.rejection_distance[0]);
   EXPECT_DOUBLE_EQ(without.rejection_distance[2], never.rejection_distance[1]);
   EXPECT_DOUBLE_EQ(without.sure_ratio, never.sure_ratio);
@@ -94,9 +95,9 @@ TEST(MatchThresholds, UseNothingOfAnObjectThatIsLeftOut) {
 
 TEST(MatchThresholds, CountNoLeadThatAWrongObjectHasHad) {
   auto evidence = even_evidence(2, 0.02, 0.5);
-  const double before = match_thresholds(evidence, one_probe(0.001)).sure_ratio;
+  const double before = match_thresholds(evidence, at_rate(0.001)).sure_ratio;
   evidence[0].false_lead = 0.1;
-  EXPECT_LT(match_thresholds(evidence, one_probe(0.001)).sure_ratio, std::min(before, 0.1));
+  EXPECT_LT(match_thresholds(evidence, at_rate(0.001)).sure_ratio, std::min(before, 0.1));
 }
 
 TEST(Misalignment, UndoneIsThePictureItself) {
