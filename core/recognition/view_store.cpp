@@ -245,6 +245,12 @@ AppearanceShape ViewStore::shape() const {
   return {size, size, static_cast<std::size_t>(appearance_bands(options_))};
 }
 
+std::vector<std::size_t> ViewStore::groups() const {
+  std::vector<std::size_t> sizes;
+  for (const ObjectViews& object : objects_) sizes.push_back(object.count);
+  return sizes;
+}
+
 bool ViewStore::has_bytes() const {
   return appearance_is_picture(options_);
 }

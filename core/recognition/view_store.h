@@ -81,6 +81,8 @@ class ViewStore final : public AppearanceSource {
   [[nodiscard]] std::size_t count() const override { return energies_.size(); }
   [[nodiscard]] std::size_t length() const override { return length_; }
   [[nodiscard]] AppearanceShape shape() const override;
+  /// One group an object.
+  [[nodiscard]] std::vector<std::size_t> groups() const override;
   [[nodiscard]] bool has_bytes() const override;
   void read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const override;
   void read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const override;

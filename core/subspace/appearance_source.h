@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -32,6 +33,9 @@ class AppearanceSource {
   [[nodiscard]] virtual std::size_t length() const = 0;  ///< N
   /// How the N numbers form a picture: only the spatial-temporal solver asks. Default: one row of N.
   [[nodiscard]] virtual AppearanceShape shape() const { return {1, length(), 1}; }
+  /// Sizes of the groups of neighbouring views that look alike, such as those of one object; they add up to
+  /// M. Only the joined solver asks. Default: one group.
+  [[nodiscard]] virtual std::vector<std::size_t> groups() const { return {count()}; }
   [[nodiscard]] virtual bool has_bytes() const { return false; }
   /// Columns [first, first + tile.cols()) as unit-energy floats; tile is N × n. @throws FileError.
   virtual void read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const = 0;

@@ -11,20 +11,18 @@
 #include "core/subspace/view_reader.h"
 
 namespace eigenpose::detail {
-namespace {
 
-/// The centred unit-energy appearances in double, N × M, and their mean.
-Eigen::MatrixXd centred_appearances(const AppearanceSource& source, Eigen::VectorXd& mean) {
-  const auto length = static_cast<Eigen::Index>(source.length());
-  const auto count = static_cast<Eigen::Index>(source.count());
-  Eigen::MatrixXd views(length, count);
+Eigen::MatrixXd centred_appearances(const AppearanceSource& source, std::size_t first, std::size_t n,
+                                    Eigen::VectorXd& mean) {
+  Eigen::MatrixXd views(static_cast<Eigen::Index>(source.length()), static_cast<Eigen::Index>(n));
   ViewReader reader(source);
-  for (Eigen::Index j = 0; j < count; ++j) {
-    reader.read(static_cast<std::size_t>(j), 1).widen(0, 0, source.length(), views.col(j).data());
+  for (Eigen::Index j = 0; j < views.cols(); ++j) {
+    const std::size_t number = first + static_cast<std::size_t>(j);
+    reader.read(number, 1).widen(0, 0, source.length(), views.col(j).data());
     if (!source.has_bytes()) continue;
     const double norm = views.col(j).norm();
     if (norm == 0.0) {
-      throw std::invalid_argument("view " + std::to_string(j) +
+      throw std::invalid_argument("view " + std::to_string(number) +
                                   " is black: it has no energy to scale; leave it out");
     }
     views.col(j) /= norm;
@@ -33,8 +31,6 @@ Eigen::MatrixXd centred_appearances(const AppearanceSource& source, Eigen::Vecto
   views.colwise() -= mean;
   return views;
 }
-
-}  // namespace
 
 EigenPairs full_eigenpairs(const Eigen::MatrixXd& matrix, Eigen::Index wanted, double noise) {
   const auto [values, vectors] = symmetric_eigen(matrix);
@@ -60,7 +56,7 @@ Eigenspace solve_dense(const SolverTask& task, SolverReport& report) {
   const SteadyClock clock;
   const TimePoint start = clock.now();
   Eigen::VectorXd mean;
-  const Eigen::MatrixXd views = centred_appearances(source, mean);
+  const Eigen::MatrixXd views = centred_appearances(source, 0, source.count(), mean);
   const bool over_views = views.cols() <= views.rows();
   const Eigen::MatrixXd scatter =
       over_views ? Eigen::MatrixXd(views.transpose() * views) : Eigen::MatrixXd(views * views.transpose());

@@ -41,7 +41,7 @@ SymmetricProduct matrix_product(const Eigen::MatrixXd& matrix, unsigned threads)
 EigenPairs leading_gram_pairs(const Eigen::MatrixXd& gram, const SolverTask& task) {
   const Eigen::Index size = gram.rows();
   const auto wanted = static_cast<Eigen::Index>(task.options.components);
-  const double noise = rounding_of_scatter(static_cast<std::size_t>(size));
+  const double noise = rounding_of_scatter(task.source.count());
   if (size > 256 && wanted < size / 6) {
     KrylovOptions krylov;
     krylov.wanted = wanted;

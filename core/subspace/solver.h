@@ -43,12 +43,36 @@ struct StaReport {
   double superblock_ratio = 0.0;   ///< superblocks over blocks of all views
 };
 
+/// How the joined solver divides the views, and what it may leave out.
+struct JoinedOptions {
+  std::size_t block = 256;  ///< most views that one eigenspace is solved of at first, at least 2
+  /// Largest share of the scatter that eigenspaces may leave out before they are joined, 0…1 (0 keeps all).
+  double left_out = 0.01;
+};
+
+/// What the joined solver did, and the proven bounds that follow. What it leaves out of the scatter, R, is
+/// positive semidefinite: eigenvalues and energy are never told too large.
+struct JoinedReport {
+  std::size_t blocks = 0;      ///< eigenspaces that were solved
+  std::size_t directions = 0;  ///< most of them together at a time: the largest eigen-solve is of so many
+  /// No K dimensions keep a larger share of the scatter than `energy` and this: min(tr R, K ‖R‖) over the
+  /// scatter.
+  double missed_energy_bound = 0.0;
+  double eigenvalue_error_bound = 0.0;  ///< no eigenvalue is farther below the true one: ‖R‖ (Weyl)
+  /// Bounds the sine of the largest angle to the true subspace: ‖R‖ / (λ_K − λ_{K+1}), 1 where that says
+  /// nothing (Davis and Kahan).
+  double angle_sine_bound = 1.0;
+};
+
 struct SolverOptions {
   /// - "gram": eigenvectors of the M × M Gram matrix, exact integers where the views are 8-bit. 8M² bytes.
   /// - "krylov": block Krylov on products with the views; no matrix. Refuses an answer it is not sure of.
   /// - "conjugate-gradient": one eigenvector after the other, deflated (appendix A); for comparison.
   /// - "sta": spatial-temporal adaptive: approximate, with proven bounds in the report. Wants `shape()` of
   /// the source.
+  /// - "joined": an eigenspace of each block of views, made orthogonal together (orthogonalization.h). Holds
+  /// the directions that count, never all views; reads each once. Leaves out a little, with proven bounds in
+  /// the report. Wants `groups()` of the source.
   /// - "dense": full eigen-solve in double; small sets, and the oracle.
   /// - "auto": gram up to some thousand views where it fits into memory, else krylov.
   std::string solver = "auto";
@@ -62,7 +86,8 @@ struct SolverOptions {
   /// Memory for all that the solver holds at once (tiles of views that are not in memory already, Gram
   /// matrix, vectors, the result), bytes; 0 means no limit. Each thread needs about 0.6 MB more.
   std::size_t memory_limit = 0;
-  StaOptions sta = {};  ///< for the solver "sta" alone
+  StaOptions sta = {};        ///< for the solver "sta" alone
+  JoinedOptions joined = {};  ///< for the solver "joined" alone
   /// Inner products that need not be computed again; the gram solver alone asks. They outlive the call.
   const KnownProducts* known = nullptr;
   /// If set, is shown all inner products, before the gram solver goes on to change them. Other solvers have
@@ -82,8 +107,9 @@ struct SolverReport {
   Duration gram_time{};
   Duration solve_time{};
   Duration back_projection_time{};
-  std::optional<StaReport> sta;  ///< of the solver "sta" alone
-  std::string note;              ///< anything a person should know, e.g. a smaller rank than asked for
+  std::optional<StaReport> sta;        ///< of the solver "sta" alone
+  std::optional<JoinedReport> joined;  ///< of the solver "joined" alone
+  std::string note;                    ///< anything a person should know, e.g. a smaller rank than asked for
 };
 
 /// The eigenspace of all views of `source`.

@@ -34,8 +34,15 @@ Eigenspace solve_dense(const SolverTask& task, SolverReport& report);
 Eigenspace solve_krylov(const SolverTask& task, SolverReport& report);
 Eigenspace solve_conjugate_gradient(const SolverTask& task, SolverReport& report);
 Eigenspace solve_sta(const SolverTask& task, SolverReport& report);
+Eigenspace solve_joined(const SolverTask& task, SolverReport& report);
 
-/// The K leading eigenpairs of a centred Gram matrix: block Krylov, or the full eigen-solve of small ones.
+/// The unit-energy appearances of views [first, first + n) in double, less their mean: N × n.
+/// @throws std::invalid_argument for a black view.
+Eigen::MatrixXd centred_appearances(const AppearanceSource& source, std::size_t first, std::size_t n,
+                                    Eigen::VectorXd& mean);
+
+/// The K leading eigenpairs of a centred Gram matrix, or of another with the same scatter: block Krylov, or
+/// the full eigen-solve of small ones.
 EigenPairs leading_gram_pairs(const Eigen::MatrixXd& gram, const SolverTask& task);
 
 /// Memory that the Gram solver needs beside the tiles, bytes.

@@ -8,15 +8,18 @@ namespace eigenpose {
 
 ViewBlock ViewBlock::part(std::size_t first, std::size_t n) const {
   return {bytes != nullptr ? bytes + first * length : nullptr,
-          floats != nullptr ? floats + first * length : nullptr, n, length};
+          floats != nullptr ? floats + first * length : nullptr, n, length,
+          doubles != nullptr ? doubles + first * length : nullptr};
 }
 
 void ViewBlock::widen(std::size_t view, std::size_t offset, std::size_t n, double* out) const {
   const std::size_t start = view * length + offset;
   if (bytes != nullptr) {
     std::copy_n(bytes + start, n, out);
-  } else {
+  } else if (floats != nullptr) {
     std::copy_n(floats + start, n, out);
+  } else {
+    std::copy_n(doubles + start, n, out);
   }
 }
 

@@ -10,12 +10,13 @@
 
 namespace eigenpose {
 
-/// Neighbouring views as they stand in memory, view after view: one of the two pointers is set.
+/// Neighbouring views as they stand in memory, view after view: one of the pointers is set.
 struct ViewBlock {
   const std::uint8_t* bytes = nullptr;
   const float* floats = nullptr;
   std::size_t count = 0;
   std::size_t length = 0;
+  const double* doubles = nullptr;
 
   /// Views [first, first + n) of this block.
   [[nodiscard]] ViewBlock part(std::size_t first, std::size_t n) const;

@@ -68,8 +68,10 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--type", arguments.type, type_help())->excludes(color)->excludes(grey);
   command.add_flag("--whole-region", arguments.whole_region,
                    "Compare whole regions alone: no windows, no alignment");
-  command.add_option("--solver", arguments.solver, "auto, gram, krylov, conjugate-gradient, sta or dense")
-      ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "dense"}))
+  command
+      .add_option("--solver", arguments.solver,
+                  "auto, gram, krylov, conjugate-gradient, sta, joined or dense")
+      ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "joined", "dense"}))
       ->capture_default_str();
   command.add_option("--degree", arguments.degree, "Degree of the spline: 1, 2 or 3")
       ->check(CLI::Range(1, 3))

@@ -98,7 +98,8 @@ const Set& set_number(std::size_t index) {
 }
 
 const std::vector<std::string>& solvers() {
-  static const std::vector<std::string> names{"gram", "krylov", "conjugate-gradient", "sta", "dense"};
+  static const std::vector<std::string> names{"gram", "krylov", "conjugate-gradient",
+                                              "sta",  "joined", "dense"};
   return names;
 }
 
@@ -147,6 +148,11 @@ void learn_set(benchmark::State& state) {
     state.counters["sta_coefficients"] = report.sta->coefficient_share;
     state.counters["sta_superblocks"] = report.sta->superblock_ratio;
     state.counters["sta_value_bound"] = report.sta->eigenvalue_error_bound;
+  }
+  if (report.joined) {
+    state.counters["joined_directions"] = static_cast<double>(report.joined->directions);
+    state.counters["joined_missed_energy_bound"] = report.joined->missed_energy_bound;
+    state.counters["joined_angle_sine_bound"] = report.joined->angle_sine_bound;
   }
 }
 /// Every solver on every set, but the full eigen-solve of 3600 views, which takes minutes.

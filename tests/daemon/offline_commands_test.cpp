@@ -80,6 +80,17 @@ TEST_F(OfflineCommands, KeepTheImageTypeInTheModelAndUseItEverywhere) {
   }
 }
 
+TEST_F(OfflineCommands, JoinTheEigenspacesOfTheObjects) {
+  write_objects();
+  const Ended learned = eigenpose("learn sets --to a.model --size 32 --whole-region --solver joined");
+  ASSERT_EQ(learned.code, 0) << learned.output;
+  const json model = json::parse(eigenpose("inspect a.model --json").output);
+  EXPECT_EQ(model["provenance"]["solver"], "joined");
+  const json seen = json::parse(eigenpose("recognize mug.png --model a.model --json").output);
+  ASSERT_EQ(seen[0]["outcomes"].size(), 1U);
+  EXPECT_EQ(seen[0]["outcomes"][0]["object"], "mug");
+}
+
 TEST_F(OfflineCommands, RefuseAnImageTypeThatIsNotThere) {
   write_objects();
   const Ended unknown = eigenpose("learn sets --to a.model --type edges");

@@ -83,6 +83,22 @@ TEST_F(Learning, GivesTheSameModelFromMemoryAndFromDisk) {
   EXPECT_EQ(disk.objects[1].rejection_distance, memory.objects[1].rejection_distance);
 }
 
+TEST_F(Learning, JoinsTheEigenspacesOfItsObjects) {
+  testing::write_turn(root(), "one", 1, 12);
+  testing::write_turn(root(), "two", 2, 8);
+  const auto sets = open_image_sets(root());
+  LearningOptions options = testing::small_learning();
+  options.solver.joined.left_out = 0.0;
+  const Model gram = learn(all_views(sets), options);
+  options.solver.solver = "joined";
+  LearningReport report;
+  const Model joined = learn(all_views(sets), options, &report);
+  EXPECT_EQ(report.solver.joined->blocks, 2U) << "one eigenspace an object";
+  // Both exact: the bases differ by float rounding, in directions that lie close to the next one by more.
+  const Eigen::MatrixXf across = gram.eigenspace.basis.transpose() * joined.eigenspace.basis;
+  EXPECT_LT((across - Eigen::MatrixXf::Identity(across.rows(), across.cols())).cwiseAbs().maxCoeff(), 1e-4F);
+}
+
 TEST_F(Learning, ReadsViewsOfEveryTypeAlikeFromMemoryAndFromDisk) {
   testing::write_turn(root(), "one", 1, 6);
   const auto sets = open_image_sets(root());

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/linear_algebra.h"
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solver.h"
 #include "tests/core/subspace/subspace_samples.h"
@@ -47,6 +48,7 @@ TEST(Orthogonalize, DropsDirectionsBelowTau) {
 TEST(Orthogonalize, HoldsEveryObjectsEigenspace) {
   const Objects objects;
   std::vector<Eigenspace> spaces;
+  spaces.reserve(3);
   std::vector<const std::vector<std::uint8_t>*> sets{&objects.mug, &objects.duck, &objects.car};
   for (const auto* bytes : sets) {
     spaces.push_back(solve_eigenspace(ByteSource(*bytes, kObjectLength), {.components = 4}));
@@ -61,6 +63,44 @@ TEST(Orthogonalize, HoldsEveryObjectsEigenspace) {
   }
   for (Eigen::Index k = 1; k < joint.components(); ++k)
     EXPECT_GE(joint.eigenvalues[k - 1], joint.eigenvalues[k]);
+}
+
+ScatterFactor all_of(const Eigen::MatrixXd& views) {
+  ScatterFactor result;
+  result.mean = views.rowwise().mean();
+  result.factor = views.colwise() - result.mean;
+  result.views = static_cast<std::size_t>(views.cols());
+  result.total_scatter = result.factor.squaredNorm();
+  return result;
+}
+
+TEST(ScatterFactor, JoinsAboutTheCommonMean) {
+  const Eigen::MatrixXd views = test::views_of_rank(30, 60, 20, 3).cast<double>();
+  const ScatterFactor whole = all_of(views);
+  ScatterFactor joined = all_of(views.leftCols(11));
+  join(joined, all_of(views.middleCols(11, 40)));
+  join(joined, all_of(views.rightCols(9)));
+  EXPECT_EQ(joined.views, 60U);
+  EXPECT_LT((joined.mean - whole.mean).norm(), 1e-14);
+  EXPECT_NEAR(joined.total_scatter, whole.total_scatter, 1e-12);
+  EXPECT_LT((joined.factor * joined.factor.transpose() - whole.factor * whole.factor.transpose()).norm(),
+            1e-12);
+  EXPECT_THROW(join(joined, all_of(Eigen::MatrixXd::Identity(7, 3))), std::invalid_argument);
+}
+
+TEST(ScatterFactor, LeavesOutNoMoreThanIsSpare) {
+  ScatterFactor views = all_of(test::views_of_rank(50, 40, 12, 6).cast<double>());
+  const Eigen::MatrixXd before = views.factor * views.factor.transpose();
+  const double spare = 0.02 * views.total_scatter;
+  orthogonalize(views, spare, 2);
+  EXPECT_LT(views.factor.cols(), 12);
+  EXPECT_LE(views.rest(), spare);
+  EXPECT_GT(views.rest(), 0.0);
+  const Eigen::MatrixXd products = views.factor.transpose() * views.factor;
+  EXPECT_LT((products - Eigen::MatrixXd(products.diagonal().asDiagonal())).norm(), 1e-12);
+  const Eigen::MatrixXd rest = before - views.factor * views.factor.transpose();
+  EXPECT_NEAR(rest.trace(), views.rest(), 1e-12);
+  EXPECT_LE(symmetric_eigen(rest).values[0], views.rest_bound + 1e-12);
 }
 
 TEST(Orthogonalize, RefusesSubspacesOfDifferentLength) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <tuple>
@@ -38,7 +39,7 @@ class OwnedBytes final : public AppearanceSource {
 };
 
 struct Sample {
-  friend void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
+  friend std::ostream& operator<<(std::ostream& out, const Sample& sample) { return out << sample.name; }
 
   std::string name;
   std::function<std::unique_ptr<AppearanceSource>()> make;
@@ -64,6 +65,13 @@ std::vector<Sample> samples() {
   };
 }
 
+/// Several blocks of every set, and nothing left out: then the joined solver is exact like the others.
+constexpr JoinedOptions kSmallBlocks{64, 0.0};
+
+SolverOptions options_of(const std::string& solver, const Sample& sample, unsigned threads = 0) {
+  return {.solver = solver, .components = sample.components, .threads = threads, .joined = kSmallBlocks};
+}
+
 class EverySolver : public testing::TestWithParam<std::tuple<std::string, Sample>> {};
 
 /// Float rounding of the basis: 6e-8 an entry, relative; in degrees, with room for the comparison.
@@ -73,9 +81,8 @@ TEST_P(EverySolver, FindsTheSubspaceOfTheDenseOracle) {
   const auto& [name, sample] = GetParam();
   const auto source = sample.make();
   SolverReport report;
-  const Eigenspace found =
-      solve_eigenspace(*source, {.solver = name, .components = sample.components}, &report);
-  const Eigenspace oracle = solve_eigenspace(*source, {.solver = "dense", .components = sample.components});
+  const Eigenspace found = solve_eigenspace(*source, options_of(name, sample), &report);
+  const Eigenspace oracle = solve_eigenspace(*source, options_of("dense", sample));
   ASSERT_EQ(found.components(), oracle.components());
   EXPECT_LE(report.residual_over_gap, 1e-3);
   EXPECT_EQ(report.components, static_cast<std::size_t>(found.components()));
@@ -91,7 +98,7 @@ TEST_P(EverySolver, FindsTheSubspaceOfTheDenseOracle) {
 TEST_P(EverySolver, KeepsTheInvariantsOfAnEigenspace) {
   const auto& [name, sample] = GetParam();
   const auto source = sample.make();
-  const Eigenspace space = solve_eigenspace(*source, {.solver = name, .components = sample.components});
+  const Eigenspace space = solve_eigenspace(*source, options_of(name, sample));
   const Eigen::MatrixXf overlap = space.basis.transpose() * space.basis;
   EXPECT_LT((overlap - Eigen::MatrixXf::Identity(overlap.rows(), overlap.cols())).cwiseAbs().maxCoeff(),
             1e-5F);
@@ -109,23 +116,116 @@ TEST_P(EverySolver, KeepsTheInvariantsOfAnEigenspace) {
 TEST_P(EverySolver, GivesTheSameBitsOnAnyNumberOfThreads) {
   const auto& [name, sample] = GetParam();
   const auto source = sample.make();
-  const Eigenspace one =
-      solve_eigenspace(*source, {.solver = name, .components = sample.components, .threads = 1});
-  const Eigenspace three =
-      solve_eigenspace(*source, {.solver = name, .components = sample.components, .threads = 3});
+  const Eigenspace one = solve_eigenspace(*source, options_of(name, sample, 1));
+  const Eigenspace three = solve_eigenspace(*source, options_of(name, sample, 3));
   EXPECT_EQ(one.basis, three.basis);
   EXPECT_EQ(one.mean, three.mean);
   EXPECT_EQ(one.eigenvalues, three.eigenvalues);
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, EverySolver,
-                         testing::Combine(testing::Values("gram", "krylov", "conjugate-gradient"),
+                         testing::Combine(testing::Values("gram", "krylov", "conjugate-gradient", "joined"),
                                           testing::ValuesIn(samples())),
                          [](const auto& drawn) {
                            std::string name = std::get<0>(drawn.param) + std::get<1>(drawn.param).name;
                            std::erase(name, '-');
                            return name;
                          });
+
+class JoinedSolver : public testing::TestWithParam<Sample> {};
+
+TEST_P(JoinedSolver, HoldsItsErrorBounds) {
+  const Sample& sample = GetParam();
+  const auto source = sample.make();
+  const Eigenspace oracle = solve_eigenspace(*source, options_of("dense", sample));
+  // Sums of unit-energy views in double.
+  const double rounding = 1e-12 * static_cast<double>(source->count());
+  for (const double left_out : {0.001, 0.02, 0.3}) {
+    for (const std::size_t block : {2U, 25U, 256U}) {
+      SolverOptions options = options_of("joined", sample);
+      options.joined = {block, left_out};
+      SolverReport report;
+      const Eigenspace found = solve_eigenspace(*source, options, &report);
+      ASSERT_TRUE(report.joined);
+      const JoinedReport& joined = *report.joined;
+      EXPECT_EQ(joined.blocks, (source->count() + block - 1) / block);
+      EXPECT_LE(joined.missed_energy_bound, left_out + rounding);
+      const Eigen::Index k = found.components();
+      ASSERT_LE(k, oracle.components());
+      const Eigen::VectorXd below = oracle.eigenvalues.head(k) - found.eigenvalues;
+      EXPECT_GE(below.minCoeff(), -rounding);
+      EXPECT_LE(below.maxCoeff(), joined.eigenvalue_error_bound + rounding);
+      EXPECT_LE(below.sum(), joined.missed_energy_bound * oracle.total_scatter + rounding);
+      if (k < oracle.components()) continue;  // so much is left out that the cut is another
+      const double sine = std::min(1.0, joined.angle_sine_bound + report.residual_over_gap);
+      EXPECT_LE(test::largest_angle_deg(found.basis, oracle.basis), std::asin(sine) * 57.3 + kFloatAngleDeg);
+      EXPECT_LT((found.mean - oracle.mean).cwiseAbs().maxCoeff(), 1e-6F);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sets, JoinedSolver, testing::ValuesIn(samples()),
+                         [](const auto& drawn) { return drawn.param.name; });
+
+/// Smooth views in groups; those of the second are all the same one.
+class GroupedViews final : public AppearanceSource {
+ public:
+  GroupedViews() {
+    Eigen::MatrixXf columns(80, 90);
+    ByteSource(test::smooth_views(90, 80, 4), 80).read(0, columns);
+    columns.middleCols(50, 30).colwise() = columns.col(50).eval();
+    source_.emplace(std::move(columns));
+  }
+  [[nodiscard]] std::size_t count() const override { return source_->count(); }
+  [[nodiscard]] std::size_t length() const override { return source_->length(); }
+  [[nodiscard]] std::vector<std::size_t> groups() const override { return {50, 30, 9, 1}; }
+  void read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const override {
+    source_->read(first, tile);
+  }
+
+ private:
+  std::optional<FloatSource> source_;
+};
+
+TEST(Joined, SolvesGroupByGroup) {
+  const GroupedViews source;
+  SolverOptions options{.solver = "joined", .components = 6};
+  options.joined = {40, 0.0};
+  SolverReport report;
+  const Eigenspace found = solve_eigenspace(source, options, &report);
+  EXPECT_EQ(report.joined->blocks, 5U) << "the first group takes two blocks";
+  // 24 of each half of the first group, none of equal views, 8 of nine views, none of one; four differences
+  // of means.
+  EXPECT_EQ(report.joined->directions, 24U + 24U + 8U + 4U);
+  const Eigenspace oracle = solve_eigenspace(source, {.solver = "dense", .components = 6});
+  EXPECT_LT(test::largest_angle_deg(found.basis, oracle.basis),
+            report.residual_over_gap * 57.3 + kFloatAngleDeg);
+  EXPECT_LT(report.joined->missed_energy_bound, 1e-12);
+}
+
+TEST(Joined, HoldsNoMoreThanItsBlocks) {
+  // 3000 views in 200 directions: joined again and again, and still within the bound.
+  const FloatSource source(test::views_of_rank(200, 3000, 150, 5));
+  const SolverOptions options{.solver = "joined", .components = 8};
+  SolverReport report;
+  const Eigenspace found = solve_eigenspace(source, options, &report);
+  EXPECT_LT(report.joined->directions, 800U);
+  const Eigenspace oracle = solve_eigenspace(source, {.solver = "krylov", .components = 8});
+  EXPECT_LE((oracle.eigenvalues - found.eigenvalues).sum(),
+            report.joined->missed_energy_bound * oracle.total_scatter + 1e-9);
+  EXPECT_LE(report.joined->missed_energy_bound, 0.01);
+}
+
+TEST(Joined, RefusesWrongOptionsAndTooLittleMemory) {
+  const auto source = bytes_of(40, 50);
+  const auto with = [](std::size_t block, double left_out, std::size_t memory) {
+    return SolverOptions{.solver = "joined", .memory_limit = memory, .joined = {block, left_out}};
+  };
+  EXPECT_THROW(solve_eigenspace(*source, with(1, 0.1, 0)), std::invalid_argument);
+  EXPECT_THROW(solve_eigenspace(*source, with(20, 1.0, 0)), std::invalid_argument);
+  EXPECT_THROW(solve_eigenspace(*source, with(20, -0.1, 0)), std::invalid_argument);
+  EXPECT_THROW(solve_eigenspace(*source, with(20, 0.1, 10'000)), std::invalid_argument);
+}
 
 TEST(Solver, ProjectsAndReconstructsWithinTheKeptEnergy) {
   const auto source = bytes_of(80, 300);
