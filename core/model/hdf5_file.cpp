@@ -208,6 +208,10 @@ bool Hdf5Group::has(const std::string& name) const {
   return H5Lexists(handle_.get(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
+bool Hdf5Group::has_attribute(const std::string& name) const {
+  return H5Aexists(handle_.get(), name.c_str()) > 0;
+}
+
 Eigen::MatrixXf Hdf5Group::read_floats(const std::string& dataset) const {
   return read_dataset<Eigen::MatrixXf>(handle_.get(), dataset, H5T_NATIVE_FLOAT);
 }

@@ -67,6 +67,7 @@ class Hdf5Group {
   [[nodiscard]] std::int64_t read_integer(const std::string& attribute) const;
   [[nodiscard]] bool read_bool(const std::string& attribute) const { return read_integer(attribute) != 0; }
   [[nodiscard]] std::string read_text(const std::string& attribute) const;
+  [[nodiscard]] bool has_attribute(const std::string& name) const;
 
   /// Datasets. A matrix is stored column after column, as rows of a file dataset: its shape there is cols ×
   /// rows.

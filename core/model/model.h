@@ -43,7 +43,8 @@ struct Provenance {
   std::string created;     ///< ISO 8601, UTC
   std::string image_sets;  ///< folder learned from
   std::string solver;
-  double energy = 0.0;  ///< share of the scatter that the eigenspace keeps
+  double energy = 0.0;        ///< share of the scatter that the eigenspace keeps
+  double energy_bound = 0.0;  ///< how far off that may be, by the solver's report; 0: exact
 };
 
 /// A learned model. Immutable once made: share it as std::shared_ptr<const Model>.

@@ -103,6 +103,7 @@ void write_content(const Model& model, const std::filesystem::path& part) {
   provenance.write("image_sets", model.provenance.image_sets);
   provenance.write("solver", model.provenance.solver);
   provenance.write("energy", model.provenance.energy);
+  if (model.provenance.energy_bound > 0.0) provenance.write("energy_bound", model.provenance.energy_bound);
 }
 
 Model read_content(const std::filesystem::path& path) {
@@ -123,6 +124,8 @@ Model read_content(const std::filesystem::path& path) {
   model.provenance.image_sets = provenance.read_text("image_sets");
   model.provenance.solver = provenance.read_text("solver");
   model.provenance.energy = provenance.read_double("energy");
+  if (provenance.has_attribute("energy_bound"))
+    model.provenance.energy_bound = provenance.read_double("energy_bound");
   return model;
 }
 

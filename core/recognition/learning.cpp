@@ -190,8 +190,9 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
     parts->covered_evidence = covered_threshold(told.covered, options.match.stranger_rate);
     told.parts_time = watch.lap();
   }
-  model.provenance = {options.program_version, created, options.image_sets, told.solver.solver,
-                      told.solver.energy};
+  model.provenance = {options.program_version, created,
+                      options.image_sets,      told.solver.solver,
+                      told.solver.energy,      told.solver.energy_bound};
   if (kept) kept->commit();
   told.total_time = std::chrono::steady_clock::now() - began;
   return model;

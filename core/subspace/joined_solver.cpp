@@ -95,7 +95,7 @@ Eigenspace solve_joined(const SolverTask& task, SolverReport& report) {
       kept < pairs.values.size() ? pairs.values[kept] : pairs.next_value + pairs.next_residual;
   const double gap = pairs.values[kept - 1] - next;
   joined.eigenvalue_error_bound = rest;
-  joined.missed_energy_bound = std::min(all.rest(), static_cast<double>(kept) * rest) / all.total_scatter;
+  report.energy_bound = std::min(all.rest(), static_cast<double>(kept) * rest) / all.total_scatter;
   joined.angle_sine_bound = rest < gap ? rest / gap : 1.0;
   report.joined = joined;
   const Eigen::VectorXd values = pairs.values.head(kept);

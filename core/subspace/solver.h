@@ -55,9 +55,6 @@ struct JoinedOptions {
 struct JoinedReport {
   std::size_t blocks = 0;      ///< eigenspaces that were solved
   std::size_t directions = 0;  ///< most of them together at a time: the largest eigen-solve is of so many
-  /// No K dimensions keep a larger share of the scatter than `energy` and this: min(tr R, K ‖R‖) over the
-  /// scatter.
-  double missed_energy_bound = 0.0;
   double eigenvalue_error_bound = 0.0;  ///< no eigenvalue is farther below the true one: ‖R‖ (Weyl)
   /// Bounds the sine of the largest angle to the true subspace: ‖R‖ / (λ_K − λ_{K+1}), 1 where that says
   /// nothing (Davis and Kahan).
@@ -99,6 +96,10 @@ struct SolverReport {
   std::string solver;          ///< the one that ran
   std::size_t components = 0;  ///< K reached
   double energy = 0.0;         ///< share of the scatter kept
+  /// What is truly kept, and what the best K dimensions keep, is within this of `energy`: 0 of exact solvers.
+  /// Joined: min(tr R, K ‖R‖) over the scatter. Sta: by Mirsky's inequality, the roots of kept and whole
+  /// scatter are within √D.
+  double energy_bound = 0.0;
   /// ‖Q E − E Λ‖ / (λ_K − λ_{K+1}): bounds the sine of the largest angle between found and true subspace.
   /// Where the two eigenvalues are equal the cut is one of many (the note says so), and it is ‖Q E − E Λ‖ /
   /// λ_K.

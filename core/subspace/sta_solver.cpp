@@ -44,6 +44,16 @@ StaReport bounds(const StaCode& code, const BlockTransform& transform, const Eig
   return report;
 }
 
+/// How far the share of the scatter kept may be off, with the roots of both known within `change`.
+double energy_bound(double kept, double total, double change) {
+  const double share = kept / total;
+  const double least = std::sqrt(total) - change;
+  if (least <= 0.0) return 1.0;
+  const double high = (std::sqrt(kept) + change) / least;
+  const double low = std::max(0.0, std::sqrt(kept) - change) / (std::sqrt(total) + change);
+  return std::min(1.0, std::max(high * high - share, share - low * low));
+}
+
 }  // namespace
 
 Eigenspace solve_sta(const SolverTask& task, SolverReport& report) {
@@ -72,6 +82,7 @@ Eigenspace solve_sta(const SolverTask& task, SolverReport& report) {
   const Eigen::Index kept = components_for(pairs.values, total, options);
   judge(pairs, kept, report);
   report.sta = bounds(code, transform, pairs, kept);
+  report.energy_bound = energy_bound(pairs.values.head(kept).sum(), total, std::sqrt(code.changes.sum()));
   const TimePoint projecting = clock.now();
   const Eigen::VectorXd values = pairs.values.head(kept);
   const Eigen::MatrixXd weights =

@@ -10,6 +10,7 @@
 #include "core/model/model_file.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/geometry_report.h"
+#include "daemon/cli/learning_options.h"
 #include "daemon/cli/resemblance_report.h"
 
 namespace eigenpose::cli {
@@ -69,7 +70,8 @@ json to_json(const Model& model) {
             {"created", model.provenance.created},
             {"image_sets", model.provenance.image_sets},
             {"solver", model.provenance.solver},
-            {"energy", model.provenance.energy}}},
+            {"energy", model.provenance.energy},
+            {"energy_bound", model.provenance.energy_bound}}},
           {"objects", objects}};
 }
 
@@ -79,8 +81,9 @@ void print(const Model& model) {
   std::printf("views     %dx%d %s, %s\n", model.normalization.size, model.normalization.size,
               image_type_name(model.normalization).c_str(),
               model.normalization.cropped ? "each picture taken whole" : "objects cut out of each picture");
-  std::printf("space     %td dimensions by %s keep %.1f %% of the scatter\n", model.eigenspace.components(),
-              model.provenance.solver.c_str(), 100.0 * model.provenance.energy);
+  std::printf("space     %td dimensions by %s keep %s\n", model.eigenspace.components(),
+              model.provenance.solver.c_str(),
+              energy_text(model.provenance.energy, model.provenance.energy_bound).c_str());
   std::printf("\n%-16s %6s %18s %9s %8s  %s\n", "object", "views", "rejection distance", "typical", "memory",
               "degrees of freedom");
   for (std::size_t o = 0; o < model.objects.size(); ++o) {

@@ -79,10 +79,10 @@ void print(const Model& model, const LearningReport& report, const std::string& 
                   object.workspace[0].unit.c_str());
   }
   if (!report.solver.note.empty()) std::printf("note: %s\n", report.solver.note.c_str());
-  std::printf(
-      "learned %zu objects from %zu views in %.1f s: %zu dimensions by %s keep %.1f %% of the scatter\n",
-      model.objects.size(), report.views, seconds(report.total_time), report.solver.components,
-      report.solver.solver.c_str(), 100.0 * report.solver.energy);
+  std::printf("learned %zu objects from %zu views in %.1f s: %zu dimensions by %s keep %s\n",
+              model.objects.size(), report.views, seconds(report.total_time), report.solver.components,
+              report.solver.solver.c_str(),
+              energy_text(report.solver.energy, report.solver.energy_bound).c_str());
   print_resemblance(model);
   std::printf("model: %s\n", file.c_str());
 }

@@ -1,6 +1,7 @@
 #include "daemon/cli/learning_options.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 
 #include <CLI/CLI.hpp>
@@ -107,6 +108,16 @@ std::vector<ImageSet> open_chosen_sets(const std::string& folder, const Learning
 
 std::string absolute_folder(const std::string& folder) {
   return std::filesystem::absolute(folder).lexically_normal().string();
+}
+
+std::string energy_text(double energy, double bound) {
+  char text[64];
+  if (bound < 0.0005)
+    std::snprintf(text, sizeof text, "%.1f %% of the scatter", 100.0 * energy);
+  else
+    std::snprintf(text, sizeof text, "%.1f %% of the scatter (within %.1f %%)", 100.0 * energy,
+                  100.0 * bound);
+  return text;
 }
 
 std::size_t memory_limit(const LearningArguments& arguments) {

@@ -47,6 +47,9 @@ std::vector<ImageSet> open_chosen_sets(const std::string& folder, const Learning
 /// As a model's provenance names it.
 std::string absolute_folder(const std::string& folder);
 
+/// "76.0 % of the scatter (within 0.7 %)"; without a bound that shows, the share alone.
+std::string energy_text(double energy, double bound);
+
 /// --memory-limit in bytes.
 std::size_t memory_limit(const LearningArguments& arguments);
 

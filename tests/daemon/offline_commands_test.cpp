@@ -80,15 +80,22 @@ TEST_F(OfflineCommands, KeepTheImageTypeInTheModelAndUseItEverywhere) {
   }
 }
 
-TEST_F(OfflineCommands, JoinTheEigenspacesOfTheObjects) {
+TEST_F(OfflineCommands, SayHowFarOffTheEnergyOfASimplifyingSolverMayBe) {
   write_objects();
-  const Ended learned = eigenpose("learn sets --to a.model --size 32 --whole-region --solver joined");
-  ASSERT_EQ(learned.code, 0) << learned.output;
-  const json model = json::parse(eigenpose("inspect a.model --json").output);
-  EXPECT_EQ(model["provenance"]["solver"], "joined");
-  const json seen = json::parse(eigenpose("recognize mug.png --model a.model --json").output);
-  ASSERT_EQ(seen[0]["outcomes"].size(), 1U);
-  EXPECT_EQ(seen[0]["outcomes"][0]["object"], "mug");
+  for (const std::string solver : {"gram", "joined", "sta"}) {
+    const Ended learned = eigenpose("learn sets --to a.model --size 32 --whole-region --solver " + solver);
+    ASSERT_EQ(learned.code, 0) << learned.output;
+    const json made = json::parse(eigenpose("inspect a.model --json").output)["provenance"];
+    EXPECT_EQ(made["solver"], solver);
+    const std::string text = eigenpose("inspect a.model").output;
+    EXPECT_THAT(text, HasSubstr("dimensions by " + solver + " keep "));
+    // Eighteen views that all differ leave the joined solver nothing to leave out.
+    EXPECT_EQ(made["energy_bound"] > 0.01, solver == "sta") << made;
+    EXPECT_EQ(text.find("of the scatter (within ") != std::string::npos, solver == "sta") << text;
+    const json seen = json::parse(eigenpose("recognize mug.png --model a.model --json").output);
+    ASSERT_EQ(seen[0]["outcomes"].size(), 1U);
+    EXPECT_EQ(seen[0]["outcomes"][0]["object"], "mug") << solver;
+  }
 }
 
 TEST_F(OfflineCommands, RefuseAnImageTypeThatIsNotThere) {

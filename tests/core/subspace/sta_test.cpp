@@ -42,6 +42,15 @@ SolverOptions sta(double spatial, double temporal, std::size_t components) {
   return options;
 }
 
+/// Share of the scatter of the views themselves.
+double energy_kept(const AppearanceSource& source, const Eigenspace& space) {
+  Eigen::MatrixXf views(static_cast<Eigen::Index>(source.length()),
+                        static_cast<Eigen::Index>(source.count()));
+  source.read(0, views);
+  const Eigen::MatrixXf centred = views.colwise() - views.rowwise().mean();
+  return static_cast<double>((space.basis.transpose() * centred).squaredNorm() / centred.squaredNorm());
+}
+
 TEST(BlockTransform, KeepsInnerProductsAndComesBack) {
   const BlockTransform transform({13, 11, 3}, 8);
   ASSERT_EQ(transform.positions(), 2U * 2U * 3U);
@@ -83,6 +92,7 @@ TEST(Sta, HoldsItsErrorBounds) {
   const auto bytes = wandering_blobs(200);
   const ByteSource source(bytes, kPicture.length(), kPicture);
   bool some_angle_bound_says_something = false;
+  bool some_energy_bound_says_something = false;
   for (const double share : {0.001, 0.003, 0.01, 0.05, 0.1}) {
     for (const std::size_t components : {2U, 5U}) {
       SolverReport report;
@@ -95,10 +105,14 @@ TEST(Sta, HoldsItsErrorBounds) {
                 report.sta->eigenvalue_error_bound);
       const double bound_deg = std::asin(report.sta->angle_sine_bound) * 180.0 / std::numbers::pi;
       EXPECT_LE(test::largest_angle_deg(found.basis, exact.basis), bound_deg + 1e-4);
+      EXPECT_LE(std::abs(report.energy - exact.eigenvalues.sum() / exact.total_scatter), report.energy_bound);
+      EXPECT_LE(std::abs(report.energy - energy_kept(source, found)), report.energy_bound);
+      some_energy_bound_says_something |= report.energy_bound < 0.1;
       some_angle_bound_says_something |= report.sta->angle_sine_bound < 0.5;
     }
   }
   EXPECT_TRUE(some_angle_bound_says_something) << "the test shows nothing about angles";
+  EXPECT_TRUE(some_energy_bound_says_something) << "the test shows nothing about energy";
 }
 
 TEST(Sta, HoldsItsBoundOnEveryInnerProduct) {
