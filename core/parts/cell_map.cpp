@@ -189,11 +189,15 @@ void CellMapper::compute(const cv::Mat& picture, CellMap& map) {
   } else {
     fill<3>(root_, map);
   }
+  take_off(background_, map);
+}
+
+void take_off(const std::array<float, 3>& background, CellMap& map) {
   for (int r = CellMap::pad; r < CellMap::pad + CellMap::cells; ++r) {
     for (int c = CellMap::pad; c < CellMap::pad + CellMap::cells; ++c) {
-      float* values = map.brightness.data() + static_cast<std::size_t>((r * CellMap::side + c) * bands);
-      for (int b = 0; b < bands; ++b) {
-        values[b] = std::max(0.0F, values[b] - background_[static_cast<std::size_t>(b)]);
+      float* values = map.brightness.data() + static_cast<std::size_t>((r * CellMap::side + c) * map.bands);
+      for (int b = 0; b < map.bands; ++b) {
+        values[b] = std::max(0.0F, values[b] - background[static_cast<std::size_t>(b)]);
       }
     }
   }

@@ -53,6 +53,9 @@ class CellMapper {
   std::vector<float> root_;
 };
 
+/// Takes root brightness off each band, down to 0, as if `map` had been made with this background.
+void take_off(const std::array<float, 3>& background, CellMap& map);
+
 /// The median over `maps` (made with no background) of the root brightness of the four corner cells, per
 /// band.
 std::array<float, 3> background_level(const std::vector<CellMap>& maps);

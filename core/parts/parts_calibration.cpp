@@ -19,6 +19,7 @@ namespace {
 
 constexpr double least_covered_share = 0.05;
 constexpr double most_covered_share = 0.3;
+constexpr std::size_t most_shown = 3000;  // views of all objects: more are told by a part of them
 constexpr double least_deviation = 0.02;  // of scores: a few views cannot show that all are alike
 
 /// Scores of one object's views.
@@ -48,7 +49,7 @@ cv::Mat moved(const cv::Mat& picture, const PartsCalibrationOptions& options, st
 }
 
 Scores score_views(const PartsModel& model, std::size_t object, const PartsViews& views,
-                   const PartsCalibrationOptions& options) {
+                   const PartsCalibrationOptions& options, std::size_t stride) {
   CellMapper mapper(model.background);
   PartialMatcher matcher(model.objects, model.scale, model.voting);
   CellMap map;
@@ -60,7 +61,7 @@ Scores score_views(const PartsModel& model, std::size_t object, const PartsViews
   // The same moves on every machine and with any number of threads.
   std::mt19937 random(static_cast<unsigned>(object) + 1U);
   Scores scores;
-  for (std::size_t v = 0; v < views.count; ++v) {
+  for (std::size_t v = 0; v < views.count; v += stride) {
     mapper.compute(moved(views.view(v), options, random), map);
     make_query_windows(map, model.space, model.scale, model.voting, windows);
     matcher.match(windows, {&object, 1});
@@ -126,12 +127,15 @@ void calibrate_parts(PartsModel& model, const std::vector<PartsViews>& objects,
     throw std::invalid_argument("the rate of wrong rejections is " + std::to_string(options.rate) +
                                 ", allowed are 0 to 0.5");
   }
+  std::size_t views = 0;
+  for (const PartsViews& object : objects) views += object.count;
+  const std::size_t stride = (views + most_shown - 1) / most_shown;
   std::vector<Scores> scores(objects.size());
   parallel_for(objects.size(), options.threads, [&](std::size_t o) {
     if (stop.stop_requested()) {
       throw Interrupted();
     }
-    scores[o] = score_views(model, o, objects[o], options);
+    scores[o] = score_views(model, o, objects[o], options, stride);
     if (progress && o % 8 == 0) {
       progress({"calibrating", o, objects.size()});
     }

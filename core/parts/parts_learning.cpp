@@ -50,9 +50,15 @@ std::array<int, 2> neighbours_of(const std::vector<SampleAxis>& axes, int view) 
   return {-1, -1};
 }
 
-/// Candidates and lanes of one object, and the pictures of its lanes.
-std::vector<cv::Mat> make_lanes(const PartsViews& views, bool companions, PartsObject& object) {
-  std::vector<cv::Mat> pictures;
+/// What a learned view is compared with: itself, or a picture made of it.
+struct Lane {
+  std::size_t view = 0;
+  cv::Mat picture;  ///< empty: the view itself
+};
+
+/// Candidates and lanes of one object.
+std::vector<Lane> make_lanes(const PartsViews& views, bool companions, PartsObject& object) {
+  std::vector<Lane> lanes;
   const int count = static_cast<int>(views.count);
   for (int copy = 0; copy < (companions ? 2 : 1); ++copy) {
     for (int v = 0; v < count; ++v) {
@@ -62,18 +68,22 @@ std::vector<cv::Mat> make_lanes(const PartsViews& views, bool companions, PartsO
         n = n < 0 ? n : n + copy * count;
       }
       object.neighbours.push_back(near);
-      const cv::Mat view = views.view(static_cast<std::size_t>(v));
-      const cv::Mat picture = copy == 1 ? mirrored(view) : view;
+      cv::Mat picture;
+      if (companions) {
+        const cv::Mat view = views.view(static_cast<std::size_t>(v));
+        picture = copy == 1 ? mirrored(view) : view;
+      }
       for (const double factor : foreshortenings) {
         if (factor != 1.0 && !companions) {
           continue;
         }
-        pictures.push_back(factor == 1.0 ? picture : foreshortened(picture, factor));
+        lanes.push_back(
+            {static_cast<std::size_t>(v), factor == 1.0 ? picture : foreshortened(picture, factor)});
         object.lane_candidate.push_back(static_cast<std::uint16_t>(object.candidates.size() - 1));
       }
     }
   }
-  return pictures;
+  return lanes;
 }
 
 double median_left_out_error(const std::vector<PoseSpace>& spaces) {
@@ -110,46 +120,45 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   model.calibration.resize(count);
 
   // Cell maps of the plain views give background and window eigenspace.
-  std::vector<std::vector<CellMap>> plain(count);
-  const auto map_views = [&](std::size_t o) {
+  std::vector<std::size_t> first(count);  // view of each object
+  std::size_t views = 0;
+  for (std::size_t o = 0; o < count; ++o) {
+    first[o] = views;
+    views += objects[o].count;
+  }
+  std::vector<CellMap> maps(views);
+  parallel_for(count, options.threads, [&](std::size_t o) {
     check_stop(stop);
-    CellMapper mapper(model.background);
-    plain[o].resize(objects[o].count);
+    CellMapper mapper;
     for (std::size_t v = 0; v < objects[o].count; ++v) {
-      mapper.compute(objects[o].view(v), plain[o][v]);
+      mapper.compute(objects[o].view(v), maps[first[o] + v]);
     }
-  };
-  parallel_for(count, options.threads, map_views);
-  std::vector<CellMap> maps;
-  for (auto& of_object : plain) {
-    maps.insert(maps.end(), of_object.begin(), of_object.end());
-  }
+  });
   model.background = background_level(maps);
-  parallel_for(count, options.threads, map_views);
-  maps.clear();
-  for (auto& of_object : plain) {
-    std::move(of_object.begin(), of_object.end(), std::back_inserter(maps));
+  for (CellMap& map : maps) {
+    take_off(model.background, map);
   }
-  model.space = WindowSpace::learn(maps);
-  maps.clear();
+  model.space = WindowSpace::learn(maps, options.threads);
 
   std::vector<std::vector<Eigen::MatrixXf>> windows(count);
   std::vector<float> largest(count, 0.0F);
   parallel_for(count, options.threads, [&](std::size_t o) {
     check_stop(stop);
     CellMapper mapper(model.background);
-    CellMap map;
-    for (const cv::Mat& picture :
+    CellMap made;
+    for (const Lane& lane :
          make_lanes(objects[o], sparse(objects[o].axes, options.sparse_step), model.objects[o])) {
-      mapper.compute(picture, map);
+      if (!lane.picture.empty()) mapper.compute(lane.picture, made);
       windows[o].emplace_back();
-      model.space.project(map, 1, windows[o].back(), nullptr);
+      model.space.project(lane.picture.empty() ? maps[first[o] + lane.view] : made, 1, windows[o].back(),
+                          nullptr);
       largest[o] = std::max(largest[o], windows[o].back().cwiseAbs().maxCoeff());
     }
     if (progress && o % 8 == 0) {
       progress({"learning windows", o, count});
     }
   });
+  maps = {};
   model.scale = WindowScale::for_range(*std::max_element(largest.begin(), largest.end()));
   parallel_for(count, options.threads, [&](std::size_t o) {
     check_stop(stop);

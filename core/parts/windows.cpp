@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
 #include "core/base/linear_algebra.h"
+#include "core/base/parallel.h"
 #include "core/parts/dense_kernels.h"
 
 namespace eigenpose {
@@ -65,22 +67,22 @@ float window_vector(const CellMap& map, int row, int column, float* out) {
   return mass;
 }
 
-WindowSpace WindowSpace::learn(const std::vector<CellMap>& maps, std::size_t limit) {
+WindowSpace WindowSpace::learn(const std::vector<CellMap>& maps, unsigned threads, std::size_t limit) {
   if (maps.empty()) {
     throw std::invalid_argument("a window eigenspace needs at least one cell map, got none");
   }
   const int length = window_length(maps.front().bands);
   // Two passes over the windows keep memory small: masses first, then the scatter of the chosen ones.
   std::vector<float> scratch(static_cast<std::size_t>(length));
-  std::vector<float> masses;
-  masses.reserve(maps.size() * WindowGrid::positions);
-  double sum = 0.0;
-  for (const CellMap& map : maps) {
+  std::vector<float> masses(maps.size() * WindowGrid::positions);
+  parallel_for(maps.size(), threads, [&](std::size_t m) {
+    std::vector<float> vector(static_cast<std::size_t>(length));
     for (int p = 0; p < WindowGrid::positions; ++p) {
-      masses.push_back(window_vector(map, p / WindowGrid::side, p % WindowGrid::side, scratch.data()));
-      sum += masses.back();
+      masses[m * WindowGrid::positions + static_cast<std::size_t>(p)] =
+          window_vector(maps[m], p / WindowGrid::side, p % WindowGrid::side, vector.data());
     }
-  }
+  });
+  const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
   std::vector<float> sorted = masses;
   const auto quantile = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 3 / 10);
   std::nth_element(sorted.begin(), quantile, sorted.end());

@@ -40,7 +40,7 @@ class WindowSpace {
   WindowSpace() = default;
   /// The eigenspace of the windows of `maps`: at most `limit` of them, evenly spread, taken from those whose
   /// gradient mass is above the 30 % quantile. @throws std::invalid_argument without maps.
-  static WindowSpace learn(const std::vector<CellMap>& maps, std::size_t limit = 30000);
+  static WindowSpace learn(const std::vector<CellMap>& maps, unsigned threads = 0, std::size_t limit = 30000);
   /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
   static WindowSpace from_parts(Eigen::VectorXf mean, Eigen::MatrixXf basis, float mean_mass);
 

@@ -22,7 +22,7 @@ namespace {
 /// much.
 constexpr double observable_error_share = 0.12;
 /// Moved views that say enough of all objects together.
-constexpr std::size_t most_moved = 4000;
+constexpr std::size_t most_moved = 3000;
 
 double quantile(std::vector<double> values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size() - 1)));
@@ -57,6 +57,7 @@ std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& o
                                     const Eigenspace& eigenspace, const ManifoldSearch& search,
                                     const RejectionOptions& options, std::uint32_t seed) {
   const std::size_t copies = std::clamp<std::size_t>(most_moved / views.count(), 1, options.moved_views);
+  const std::size_t stride = (views.count() + most_moved - 1) / most_moved;
   std::mt19937 random(seed);
   const Eigen::Index length = eigenspace.length();
   const Eigen::VectorXf offset = eigenspace.basis.transpose() * eigenspace.mean;
@@ -64,7 +65,7 @@ std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& o
   std::vector<double> distances;
   AppearanceMaker maker(views.normalization());
   std::vector<float> numbers(picture_length(views.normalization()));
-  for (std::size_t i = object.first; i < object.first + object.count; ++i) {
+  for (std::size_t i = object.first; i < object.first + object.count; i += stride) {
     const cv::Mat view = views.picture(i);
     for (Eigen::Index c = 0; c < tile.cols(); ++c) {
       picture_numbers(moved(view, options, random), numbers);

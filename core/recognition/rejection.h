@@ -26,7 +26,7 @@ struct RejectionOptions {
   double shift = 0.015;          ///< of the side of the appearance, each way: 2 pixels of 128
   double scale = 0.03;           ///< each way
   double turn_deg = 1.5;         ///< in the picture's plane, each way
-  std::size_t moved_views = 4;   ///< of every learned view; fewer, but one, where they are thousands
+  std::size_t moved_views = 4;   ///< of every learned view; fewer where they are thousands
   double accepted_share = 0.99;  ///< of moved views that lie within the threshold
   double slack = 1.15;           ///< the threshold is this times their quantile: n views cannot show the tail
   unsigned threads = 0;
