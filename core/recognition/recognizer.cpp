@@ -79,9 +79,12 @@ struct Recognizer::Impl {
   std::optional<PartsStage> parts;
 
   // Scratch, reused from frame to frame.
-  std::vector<float> typed_from;  ///< the picture, where the appearance is another
-  Eigen::VectorXf appearance;
-  Eigen::VectorXf point;
+  Eigen::MatrixXf appearances;  ///< one column a region of the batch
+  Eigen::MatrixXf points;       ///< likewise
+  Eigen::MatrixXf typed_from;   ///< likewise, the pictures, where appearances are others
+  std::array<float, most_projected> energies{};
+  Eigen::Index column = 0;  ///< of the region that is looked at
+  Eigen::VectorXf point;    ///< its projection
   std::array<ClosestPoint, 3> closest;
   std::size_t closest_count = 0;
   std::array<double, max_manifold_dofs> other_q{};
@@ -92,11 +95,20 @@ struct Recognizer::Impl {
 
   std::span<const Region> find_regions(const cv::Mat& image);
   [[nodiscard]] bool too_small(const Region& region) const;
-  /// Fills `picture()` and `appearance`; returns the energy of the latter.
-  float normalize(const cv::Mat& image, std::size_t region);
-  /// The normalised picture of the region.
+  /// Whether what the region shows is worth a look.
+  [[nodiscard]] bool refused(const Region& region) const {
+    return region.touches_border || too_small(region);
+  }
+  /// Fills `picture()`, `appearance()` and the energy of the latter.
+  void normalize(const cv::Mat& image, std::size_t region);
+  /// The normalised picture of the region that is looked at, and its appearance.
   [[nodiscard]] std::span<float> picture();
-  void project(float energy);
+  [[nodiscard]] std::span<float> appearance() { return numbers(appearances); }
+  [[nodiscard]] std::span<float> numbers(Eigen::MatrixXf& of_batch) const {
+    return {of_batch.col(column).data(), static_cast<std::size_t>(of_batch.rows())};
+  }
+  /// Says what region `region` shows, which was normalised and projected.
+  void judge_region(const cv::Mat& image, std::size_t region);
   void find_closest();
   /// Puts first whichever close candidate explains the whole picture best, and takes the pose from where it
   /// is seen best.
@@ -119,8 +131,10 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
       search(make_search(options.search, manifolds)),
       own_spaces(*model),
       mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
-      typed_from(maker.is_picture() ? 0 : picture_length(model->normalization)),
-      appearance(model->eigenspace.length()),
+      appearances(model->eigenspace.length(), most_projected),
+      points(model->eigenspace.components(), most_projected),
+      typed_from(maker.is_picture() ? 0 : static_cast<Eigen::Index>(picture_length(model->normalization)),
+                 most_projected),
       point(model->eigenspace.components()) {
   poses.reserve(manifolds.size());
   for (const Manifold& manifold : manifolds) poses.emplace_back(manifold);
@@ -142,24 +156,15 @@ bool Recognizer::Impl::too_small(const Region& region) const {
 }
 
 std::span<float> Recognizer::Impl::picture() {
-  if (!maker.is_picture()) return typed_from;
-  return {appearance.data(), static_cast<std::size_t>(appearance.size())};
+  return numbers(maker.is_picture() ? appearances : typed_from);
 }
 
-float Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
-  const float energy =
-      model->normalization.cropped
-          ? normalizer.normalize(image, {0, 0, 0}, picture())
-          : normalizer.normalize(segmenter.cut_out(image, region), segmenter.background().level, picture());
-  if (maker.is_picture()) return energy;
-  return maker.make(typed_from, {appearance.data(), static_cast<std::size_t>(appearance.size())});
-}
-
-void Recognizer::Impl::project(float energy) {
-  // Norm and mean are folded in: basisᵀ (x/‖x‖ − mean).
-  project_onto(model->eigenspace.basis, appearance, point);
-  point /= energy;
-  point -= mean_point;
+void Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
+  float& energy = energies[static_cast<std::size_t>(column)];
+  energy = model->normalization.cropped ? normalizer.normalize(image, {0, 0, 0}, picture())
+                                        : normalizer.normalize(segmenter.cut_out(image, region),
+                                                               segmenter.background().level, picture());
+  if (!maker.is_picture()) energy = maker.make(picture(), appearance());
 }
 
 void Recognizer::Impl::find_closest() {
@@ -179,7 +184,7 @@ void Recognizer::Impl::look_again() {
     return model->objects[found.manifold].space->better_pose;
   };
   if (!std::all_of(closest.begin(), close, has_space) || (!doubtful && !better_pose(closest[0]))) return;
-  own_spaces.look({appearance.data(), static_cast<std::size_t>(appearance.size())});
+  own_spaces.look(appearance());
   std::array<ClosestPoint, 3> seen;
   for (auto found = closest.begin(); found != close; ++found)
     seen[static_cast<std::size_t>(found - closest.begin())] = own_spaces.closest(found->manifold);
@@ -192,6 +197,23 @@ void Recognizer::Impl::look_again() {
   const ClosestPoint& own = seen[static_cast<std::size_t>(winner)];
   if (better_pose(closest[0]) && same_valley(model->objects[own.manifold].manifold, own, closest[0]))
     closest[0].q = own.q;
+}
+
+void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region) {
+  const float energy = energies[static_cast<std::size_t>(column)];
+  if (!(energy > 0.0F)) return;  // black: nothing is known of it
+  // Norm and mean are folded in: basisᵀ (x/‖x‖ − mean).
+  point = points.col(column) / energy - mean_point;
+  find_closest();
+  Outcome& outcome = outcomes[outcome_count - 1];
+  if (!parts) {
+    look_again();
+    judge(outcome);
+    return;
+  }
+  const std::size_t object = parts->judge(picture(), closest[0].manifold, outcome);
+  if (outcome.verdict == Verdict::unknown || parts->too_large(outcome.box.size(), object, outcome))
+    take_apart(image, region);
 }
 
 void Recognizer::Impl::judge(Outcome& outcome) {
@@ -285,34 +307,30 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
     regions = impl.find_regions(image);
   }
   impl.outcome_count = 0;
-  for (std::size_t i = 0; i < regions.size(); ++i) {
-    const Region& region = regions[i];
-    Outcome& outcome = impl.next_outcome();
-    outcome.box = region.box;
-    if (region.touches_border || impl.too_small(region)) {
-      outcome.verdict = region.touches_border ? Verdict::touches_border : Verdict::too_small;
-      continue;
-    }
-    float energy = 0.0F;
+  for (std::size_t begin = 0, end = 0; begin < regions.size(); begin = end) {
+    // As many regions as are projected together.
     {
       const Lap lap(spent.normalize);
-      energy = impl.normalize(image, i);
+      for (impl.column = 0; end < regions.size() && impl.column < most_projected; ++end) {
+        if (impl.refused(regions[end])) continue;
+        impl.normalize(image, end);
+        ++impl.column;
+      }
     }
-    if (!(energy > 0.0F)) continue;  // black: nothing is known of it
     {
       const Lap lap(spent.project);
-      impl.project(energy);
+      project_onto(impl.model->eigenspace.basis, impl.appearances, impl.column, impl.points);
     }
-    {
-      const Lap lap(spent.search);
-      impl.find_closest();
-      if (impl.parts) {
-        const std::size_t object = impl.parts->judge(impl.picture(), impl.closest[0].manifold, outcome);
-        if (outcome.verdict == Verdict::unknown || impl.parts->too_large(outcome.box.size(), object, outcome))
-          impl.take_apart(image, i);
+    const Lap lap(spent.search);
+    impl.column = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      Outcome& outcome = impl.next_outcome();
+      outcome.box = regions[i].box;
+      if (impl.refused(regions[i])) {
+        outcome.verdict = regions[i].touches_border ? Verdict::touches_border : Verdict::too_small;
       } else {
-        impl.look_again();
-        impl.judge(outcome);
+        impl.judge_region(image, i);
+        ++impl.column;
       }
     }
   }
