@@ -17,11 +17,11 @@ namespace {
 constexpr double same_extent = 0.12;
 constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are told apart less finely
 /// An object may reach beyond what is seen of it by this share of its side: so much may be covered.
-constexpr double most_beyond = 0.35;
+constexpr double most_beyond = 0.45;
 /// A box of another size than the object's costs it votes: so many of those its own views get, or more.
-constexpr double least_trial_votes = 0.8;
+constexpr double least_trial_votes = 0.7;
 constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
-constexpr double place_step = 0.2;      ///< between boxes away from the corners, in their sides
+constexpr double place_step = 0.25;     ///< between boxes away from the corners, in their sides
 constexpr double least_filled = 0.6;    ///< of a box away from the corners: foreground
 constexpr double same_place = 0.7;      ///< of two boxes' union
 constexpr int most_looks = 3000;        ///< at boxes; then it stays with what was found
