@@ -329,7 +329,7 @@ const TakenApart& FusedRegion::take_apart(const cv::Mat& cut, const Background& 
     }
     FusedObject again = settle(objects[i].box, std::span(&objects[i].found.best.object, 1));
     if (again.found.best.poses.empty()) continue;
-    again.found.second = std::move(objects[i].found.second);
+    again.found.second = objects[i].found.second;
     again.found.second_share = objects[i].found.second_share;
     again.found.tie = objects[i].found.tie;
     objects[i] = std::move(again);

@@ -51,7 +51,7 @@ struct Outcome {
   /// Share of the region that does not show the best object: something covers it, or stands beside it. An
   /// object that is partly covered is recognised by its windows, whatever its distance.
   double covered_share = 0.0;
-  double confidence = 0.0;  ///< 0…1
+  double confidence = 0.0;  ///< 0…1; towards the rejection threshold ½ and less
 
   /// Sets q_covariance to m × m numbers times `scale`, and q_sigma. DOFs that are not `observable` become
   /// infinite, and related to none.

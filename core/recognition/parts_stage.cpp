@@ -129,6 +129,12 @@ void PartsStage::describe(const PartsIdentification& found, const RealignedDista
   finding.covered = found.best.covered;
   finding.runner_up_share = found.second_share;
   finding.tie = found.tie;
+  const PartsCalibration& calibration = model_.parts->calibration[finding.object];
+  const double beyond =
+      distance.own <= calibration.rejection_distance
+          ? likelihood(calibration.rejection_distance, distance.own, calibration.typical_distance)
+          : std::exp(model_.parts->covered_evidence - found.evidence);
+  finding.margin = 1.0 / (1.0 + beyond);
   describe(finding, accepted, outcome);
   if (found.second) {
     pool_.fill(outcome.runner_up, model_.objects[found.second->object].name, found.second->poses.front().q,
@@ -157,6 +163,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
   outcome.verdict = finding.tie ? Verdict::ambiguous : Verdict::recognized;
   if (finding.runner_up_share > 0.0) {
     outcome.confidence =
+        finding.margin *
         std::clamp((1.0 - finding.covered) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
   } else {
     const auto beside = [&](double distance) {

@@ -51,6 +51,7 @@ class PartsStage {
     RealignedDistance distance;
     double covered = 0.0;
     double runner_up_share = 0.0;  ///< of votes; 0 where the whole region settled it
+    double margin = 1.0;           ///< how clearly the votes' answer was accepted: ½ at the threshold, …1
     bool tie = false;
   };
 

@@ -2,10 +2,10 @@
 ///
 /// 640×480 colour pictures with 1 to 4 of the learned objects (20 unless another number is given), 64×64 in
 /// colour, 20 dimensions, one thread; first the whole-region match alone, then with windows and alignment, as
-/// learned by default. Each picture is written just before, as a camera's conversion writes it. Thread CPU time;
-/// p50 and p99 over frames. The peer does the same work as one would
-/// write it down: grey, threshold, connected components with statistics, area resize, float, unit energy,
-/// subtract the mean, product, nearest of 360 samples an object.
+/// learned by default. Each picture is written just before, as a camera's conversion writes it. Thread CPU
+/// time; p50 and p99 over frames. The peer does the same work as one would write it down: grey, threshold,
+/// connected components with statistics, area resize, float, unit energy, subtract the mean, product, nearest
+/// of 360 samples an object.
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,7 @@
 // Uncertainty of several DOFs together.
 #include "core/manifold/pose_covariance.h"
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -15,7 +16,7 @@ TEST(PoseCovariance, IsTheSpreadOfLeastSquaresEstimates) {
   Eigen::MatrixXd jacobian(6, 2);
   jacobian << 1.0, 0.9, 0.2, -0.1, -0.5, -0.7, 0.3, 0.4, 0.0, 0.2, -0.4, -0.3;
   constexpr double sigma = 0.1;
-  std::vector<double> covariance;
+  std::array<double, 4> covariance{};
   set_covariance(jacobian.transpose() * jacobian, sigma * sigma, covariance);
   std::mt19937 random(2);
   std::normal_distribution<double> normal(0.0, sigma);
@@ -35,7 +36,7 @@ TEST(PoseCovariance, IsTheSpreadOfLeastSquaresEstimates) {
 TEST(PoseCovariance, IsInfiniteWhereNothingIsSeen) {
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   information(0, 0) = 4.0;
-  std::vector<double> covariance;
+  std::array<double, 4> covariance{};
   set_covariance(information, 1.0, covariance);
   EXPECT_NEAR(covariance[0], 0.25, 1e-12);
   EXPECT_EQ(covariance[1], 0.0);

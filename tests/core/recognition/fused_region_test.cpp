@@ -73,6 +73,37 @@ TEST(FusedRegion, TellsTouchingObjectsApart) {
   EXPECT_GE(right, pairs - 2) << "of " << pairs;
 }
 
+TEST(PartsStage, IsLessSureTheMoreIsCovered) {
+  Recognizer recognize(world().model);
+  double last = 1.0;
+  double least = 1.0;
+  for (const double hidden : {0.0, 0.15, 0.3}) {
+    double sum = 0.0;
+    int told = 0;
+    for (double angle = 5.0; angle < 360.0; angle += 30.0) {
+      cv::Mat scene = testing::scene_with(1, angle, PartsWorld::knobs());
+      Segmenter segmenter(recognize.model().normalization.segmentation);
+      cv::Rect box = segmenter.segment(scene)[0].box;
+      // What is hidden is as dark as the table, in the middle of one side: the outline stays.
+      const int height = static_cast<int>(hidden * box.height);
+      scene(cv::Rect(box.x + box.width / 4, box.y + box.height / 2, box.width / 2, height))
+          .setTo(cv::Scalar::all(3));
+      for (const Outcome& outcome : recognize.recognize(scene)) {
+        if (outcome.verdict != Verdict::recognized) continue;
+        EXPECT_EQ(outcome.best->object, "one");
+        sum += outcome.confidence;
+        least = std::min(least, outcome.confidence);
+        ++told;
+      }
+    }
+    ASSERT_GT(told, 0) << hidden;
+    EXPECT_LT(sum / told, last + 1e-9) << hidden;
+    last = sum / told;
+  }
+  EXPECT_GT(least, 0.0);
+  EXPECT_LT(last, 0.9);
+}
+
 TEST(FusedRegion, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
   Model model = *world().model;
   auto parts = std::make_shared<PartsModel>(*model.parts);
