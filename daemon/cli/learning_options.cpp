@@ -97,7 +97,12 @@ std::vector<ImageSet> open_chosen_sets(const std::string& folder, const Learning
     if (std::none_of(sets.begin(), sets.end(), [&](const ImageSet& set) { return set.object() == name; })) {
       std::string known;
       for (const ImageSet& set : sets) known += (known.empty() ? "" : ", ") + set.object();
-      throw ConfigError("--objects: there is no \"" + name + "\" in " + folder + "; there are: " + known);
+      throw ConfigError(std::string("--objects: there is no \"")
+                            .append(name)
+                            .append("\" in ")
+                            .append(folder)
+                            .append("; there are: ")
+                            .append(known));
     }
   std::erase_if(sets, [&](const ImageSet& set) {
     return std::find(arguments.objects.begin(), arguments.objects.end(), set.object()) ==
