@@ -11,8 +11,8 @@
 
 #include "config/config.h"
 #include "core/base/clock.h"
-#include "daemon/frame_hub.h"
-#include "daemon/rig.h"
+#include "daemon/rig/frame_hub.h"
+#include "daemon/rig/rig.h"
 
 namespace eigenpose {
 

@@ -19,7 +19,7 @@
 #include "daemon/api/server.h"
 #include "daemon/api/unix_socket.h"
 #include "daemon/devices.h"
-#include "daemon/service.h"
+#include "daemon/service/service.h"
 
 namespace eigenpose {
 namespace {

@@ -6,10 +6,10 @@
 #include <exception>
 #include <memory>
 
-#include "core/image/image_set.h"
+#include "core/dataset/image_set.h"
 #include "core/image/picture_file.h"
+#include "core/learning/learning.h"
 #include "core/model/model_file.h"
-#include "core/recognition/learning.h"
 #include "core/recognition/recognizer.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "core/image/image_type.h"
-#include "core/image/normalization_kernels.h"
+#include "core/simd/normalization_kernels.h"
 
 namespace eigenpose {
 namespace {

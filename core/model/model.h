@@ -12,8 +12,8 @@
 #include "core/base/workspace.h"
 #include "core/image/normalization.h"
 #include "core/manifold/manifold.h"
-#include "core/model/object_space.h"
-#include "core/parts/parts_model.h"
+#include "core/model/object_eigenspace.h"
+#include "core/model/parts_model.h"
 #include "core/subspace/eigenspace.h"
 
 namespace eigenpose {

@@ -7,9 +7,9 @@
 #include "core/base/atomic_file.h"
 #include "core/base/error.h"
 #include "core/model/hdf5_file.h"
+#include "core/model/hdf5_links.h"
 #include "core/model/parts_file.h"
 #include "core/model/sealed_file.h"
-#include "core/model/shared_groups.h"
 
 namespace eigenpose {
 namespace {

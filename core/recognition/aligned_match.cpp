@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
-#include "core/parts/misalignment.h"
-#include "core/recognition/projection_kernel.h"
+#include "core/alignment/misalignment.h"
+#include "core/simd/projection_kernel.h"
 
 namespace eigenpose {
 

@@ -13,10 +13,10 @@
 
 #include <Eigen/Core>
 
+#include "core/alignment/alignment.h"
 #include "core/image/appearance_maker.h"
-#include "core/manifold/search.h"
 #include "core/model/model.h"
-#include "core/parts/alignment.h"
+#include "core/search/search.h"
 
 namespace eigenpose {
 

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/image/normalization.h"
-#include "core/parts/covered_calibration.h"
+#include "core/recognition/decision.h"
 #include "core/recognition/likelihood.h"
 
 namespace eigenpose {

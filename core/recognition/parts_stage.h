@@ -9,17 +9,14 @@
 
 #include <opencv2/core.hpp>
 
-#include "core/manifold/search.h"
 #include "core/model/model.h"
-#include "core/parts/parts_recognizer.h"
 #include "core/recognition/aligned_match.h"
-#include "core/recognition/fused_region.h"
 #include "core/recognition/outcome.h"
+#include "core/recognition/parts_recognizer.h"
+#include "core/recognition/touching_objects.h"
+#include "core/search/search.h"
 
 namespace eigenpose {
-
-/// Another pose counts as another when it is this share of a DOF's range away: 30° of a turn.
-inline constexpr double poses_apart = 1.0 / 12.0;
 
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {

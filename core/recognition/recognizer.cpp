@@ -9,13 +9,14 @@
 #include "core/image/appearance_maker.h"
 #include "core/image/normalization.h"
 #include "core/image/segmentation.h"
-#include "core/manifold/pattern_rejector.h"
-#include "core/manifold/search.h"
+#include "core/recognition/decision.h"
 #include "core/recognition/likelihood.h"
-#include "core/recognition/own_spaces.h"
+#include "core/recognition/manifold_samples.h"
+#include "core/recognition/object_eigenspace_index.h"
 #include "core/recognition/parts_stage.h"
-#include "core/recognition/pose_table.h"
-#include "core/recognition/projection_kernel.h"
+#include "core/search/pattern_rejector.h"
+#include "core/search/search.h"
+#include "core/simd/projection_kernel.h"
 
 namespace eigenpose {
 namespace {

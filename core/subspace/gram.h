@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "core/base/progress.h"
+#include "core/simd/product_kernels.h"
 #include "core/subspace/appearance_source.h"
-#include "core/subspace/kernels.h"
 
 namespace eigenpose {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
-#include "core/subspace/kernels.h"
+#include "core/simd/product_kernels.h"
 #include "core/subspace/sta_code.h"
 #include "core/subspace/work_meter.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
-#include "core/subspace/kernels.h"
+#include "core/simd/product_kernels.h"
 
 namespace eigenpose {
 namespace {

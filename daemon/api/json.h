@@ -8,10 +8,10 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/base/workspace.h"
-#include "daemon/frame_hub.h"
-#include "daemon/jobs.h"
-#include "daemon/rig.h"
-#include "daemon/service.h"
+#include "daemon/rig/frame_hub.h"
+#include "daemon/rig/rig.h"
+#include "daemon/service/jobs.h"
+#include "daemon/service/service.h"
 
 namespace eigenpose {
 

@@ -3,7 +3,7 @@
 /// The table of what the API offers, and what each entry does.
 
 #include "daemon/api/http.h"
-#include "daemon/service.h"
+#include "daemon/service/service.h"
 
 namespace eigenpose {
 

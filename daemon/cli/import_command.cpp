@@ -8,8 +8,8 @@
 #include <CLI/CLI.hpp>
 
 #include "core/base/error.h"
-#include "core/image/coil_import.h"
-#include "core/image/turned_import.h"
+#include "core/dataset/coil_import.h"
+#include "core/dataset/turned_import.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 

@@ -10,9 +10,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/learning/learning.h"
+#include "core/learning/training_archive.h"
 #include "core/model/model_file.h"
-#include "core/recognition/kept_views.h"
-#include "core/recognition/learning.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 #include "daemon/cli/learning_options.h"

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/image/image_set.h"
-#include "core/recognition/learning.h"
+#include "core/dataset/image_set.h"
+#include "core/learning/learning.h"
 
 namespace CLI {
 class App;

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "core/recognition/resemblance.h"
+#include "core/evaluation/resemblance.h"
 
 namespace eigenpose::cli {
 namespace {

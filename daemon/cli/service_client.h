@@ -9,7 +9,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "daemon/client/api_client.h"
+#include "daemon/api/client/api_client.h"
 
 namespace CLI {
 class App;

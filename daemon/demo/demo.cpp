@@ -21,8 +21,8 @@
 #include "core/base/angle.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "daemon/api/client/api_client.h"
 #include "daemon/cli/console.h"
-#include "daemon/client/api_client.h"
 #include "sim/lab/lab_client.h"
 
 namespace eigenpose {

@@ -19,7 +19,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/recognition/learning.h"
+#include "core/learning/learning.h"
 #include "core/recognition/recognizer.h"
 #include "tests/bench/series.h"
 #include "tests/support/synthetic_objects.h"

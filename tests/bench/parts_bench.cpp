@@ -16,10 +16,10 @@
 #include <string>
 #include <vector>
 
-#include "core/parts/covered_calibration.h"
-#include "core/parts/parts_recognizer.h"
-#include "core/recognition/evaluation.h"
-#include "core/recognition/learning.h"
+#include "core/evaluation/evaluation.h"
+#include "core/image/occlusion.h"
+#include "core/learning/learning.h"
+#include "core/recognition/parts_recognizer.h"
 #include "core/recognition/recognizer.h"
 #include "tests/bench/series.h"
 #include "tests/support/synthetic_objects.h"

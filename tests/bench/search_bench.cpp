@@ -21,8 +21,8 @@
 #include <flann/algorithms/kdtree_single_index.h>
 #include <flann/util/result_set.h>
 
-#include "core/manifold/best_list.h"
-#include "core/manifold/search.h"
+#include "core/search/best_list.h"
+#include "core/search/search.h"
 #include "tests/bench/search_worlds.h"
 
 namespace eigenpose::bench {

@@ -21,10 +21,10 @@
 #include <string>
 
 #include "core/base/parallel.h"
-#include "core/manifold/search.h"
+#include "core/search/search.h"
 #include "tests/bench/search_worlds.h"
-#include "tests/core/manifold/search_queries.h"
-#include "tests/core/manifold/synthetic.h"
+#include "tests/core/search/search_queries.h"
+#include "tests/support/synthetic_manifolds.h"
 
 namespace eigenpose {
 namespace {

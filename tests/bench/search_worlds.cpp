@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/manifold/search.h"
+#include "core/search/search.h"
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solver.h"
 

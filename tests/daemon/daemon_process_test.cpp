@@ -17,7 +17,7 @@
 #include <sys/wait.h>
 
 #include "core/base/clock.h"
-#include "daemon/client/api_client.h"
+#include "daemon/api/client/api_client.h"
 #include "sim/lab/lab_client.h"
 #include "sim/lab/sim_lab.h"
 #include "sim/modbus/modbus_server.h"

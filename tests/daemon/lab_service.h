@@ -12,7 +12,7 @@
 
 #include "config/config.h"
 #include "core/base/clock.h"
-#include "daemon/service.h"
+#include "daemon/service/service.h"
 #include "sim/lab/lab_client.h"
 #include "tests/support/temporary_folder.h"
 

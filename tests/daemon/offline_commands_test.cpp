@@ -11,7 +11,7 @@
 #include <opencv2/core.hpp>
 #include <sys/wait.h>
 
-#include "core/image/image_set.h"
+#include "core/dataset/image_set.h"
 #include "core/image/picture_file.h"
 #include "tests/support/synthetic_objects.h"
 #include "tests/support/temporary_folder.h"

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/angle.h"
-#include "core/image/image_set.h"
+#include "core/dataset/image_set.h"
 #include "core/model/model_file.h"
 #include "tests/daemon/lab_service.h"
 

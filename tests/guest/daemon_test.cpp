@@ -19,8 +19,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/image/image_set.h"
-#include "daemon/client/api_client.h"
+#include "core/dataset/image_set.h"
+#include "daemon/api/client/api_client.h"
 #include "sim/lab/sim_lab.h"
 #include "sim/modbus/modbus_server.h"
 #include "sim/modbus/rtu_server.h"

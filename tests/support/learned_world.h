@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/image/image_set.h"
+#include "core/dataset/image_set.h"
+#include "core/learning/learning.h"
 #include "core/model/model.h"
-#include "core/recognition/learning.h"
 #include "tests/support/synthetic_objects.h"
 #include "tests/support/temporary_folder.h"
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/image/image_set.h"
+#include "core/dataset/image_set.h"
 
 namespace eigenpose::testing {
 namespace {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/imgproc.hpp>
 
-#include "core/image/threshold_kernels.h"
+#include "core/simd/threshold_kernels.h"
 #include "tests/support/synthetic_objects.h"
 
 namespace eigenpose {

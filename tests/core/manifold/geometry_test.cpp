@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/core/manifold/synthetic.h"
+#include "tests/support/synthetic_manifolds.h"
 
 namespace eigenpose {
 namespace {

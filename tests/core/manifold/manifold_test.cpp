@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/core/manifold/synthetic.h"
+#include "tests/support/synthetic_manifolds.h"
 
 namespace eigenpose {
 namespace {

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
-#include "tests/core/manifold/synthetic.h"
+#include "tests/support/synthetic_manifolds.h"
 
 namespace eigenpose {
 namespace {

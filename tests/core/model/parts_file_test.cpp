@@ -4,10 +4,10 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "core/learning/calibration/parts_calibration.h"
 #include "core/model/model_file.h"
-#include "core/parts/parts_calibration.h"
-#include "core/parts/parts_recognizer.h"
-#include "tests/core/parts/pictures.h"
+#include "core/recognition/parts_recognizer.h"
+#include "tests/support/drawn_pictures.h"
 
 namespace eigenpose {
 namespace {

@@ -1,0 +1,323 @@
+#include "core/alignment/alignment_eigenspace.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include <emmintrin.h>
+#include <opencv2/imgproc.hpp>
+
+#include "core/base/linear_algebra.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr int coarse_side = 32;
+constexpr int fine_side = 48;        // finer gains nothing and costs memory: 0.3 MB for 36 views
+constexpr double coarse_blur = 1.5;  // pixels of the 64×64 picture
+constexpr std::size_t most_samples = 4096;
+
+/// Brightness and differences together at any place; outside its edge the picture goes on as it ends. Four
+/// floats a register: SSE2 is in every x86-64.
+struct Sampler {
+  const float* texels;
+
+  /// Samples four places.
+  void four(__m128 x, __m128 y, __m128 (&samples)[4]) const {
+    const __m128 last = _mm_set1_ps(static_cast<float>(PosePicture::side - 1));
+    const __m128 before_last = _mm_set1_ps(static_cast<float>(PosePicture::side - 2));
+    x = _mm_min_ps(_mm_max_ps(x, _mm_setzero_ps()), last);
+    y = _mm_min_ps(_mm_max_ps(y, _mm_setzero_ps()), last);
+    const __m128i column = _mm_cvttps_epi32(_mm_min_ps(x, before_last));
+    const __m128i row = _mm_cvttps_epi32(_mm_min_ps(y, before_last));
+    alignas(16) std::array<float, 4> fx;
+    alignas(16) std::array<float, 4> fy;
+    alignas(16) std::array<std::int32_t, 4> at;
+    _mm_store_ps(fx.data(), _mm_sub_ps(x, _mm_cvtepi32_ps(column)));
+    _mm_store_ps(fy.data(), _mm_sub_ps(y, _mm_cvtepi32_ps(row)));
+    static_assert(PosePicture::side == 1 << 6);
+    _mm_store_si128(reinterpret_cast<__m128i*>(at.data()), _mm_add_epi32(_mm_slli_epi32(row, 6), column));
+    constexpr std::ptrdiff_t next_row = std::ptrdiff_t{4} * PosePicture::side;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const float* p = texels + std::ptrdiff_t{4} * at[k];
+      const __m128 across = _mm_set1_ps(fx[k]);
+      const __m128 left = _mm_loadu_ps(p);
+      const __m128 below = _mm_loadu_ps(p + next_row);
+      const __m128 top = _mm_add_ps(left, _mm_mul_ps(across, _mm_sub_ps(_mm_loadu_ps(p + 4), left)));
+      const __m128 bottom =
+          _mm_add_ps(below, _mm_mul_ps(across, _mm_sub_ps(_mm_loadu_ps(p + next_row + 4), below)));
+      samples[k] = _mm_add_ps(top, _mm_mul_ps(_mm_set1_ps(fy[k]), _mm_sub_ps(bottom, top)));
+    }
+  }
+};
+
+using Brightness = std::array<float, std::size_t{PosePicture::side} * PosePicture::side>;
+
+/// Gaussian of σ = coarse_blur; beyond its edge the picture goes on as it ends.
+void blur(const Brightness& in, Brightness& out) {
+  constexpr int n = PosePicture::side;
+  constexpr int reach = 4;
+  std::array<float, 2 * reach + 1> kernel;
+  float sum = 0.0F;
+  for (int k = -reach; k <= reach; ++k)
+    sum += kernel[static_cast<std::size_t>(k + reach)] =
+        static_cast<float>(std::exp(-0.5 * k * k / (coarse_blur * coarse_blur)));
+  for (float& weight : kernel) weight /= sum;
+  Brightness across;
+  std::array<float, n + 2 * reach> row;
+  for (int r = 0; r < n; ++r) {
+    const float* from = in.data() + r * n;
+    std::copy_n(from, n, row.data() + reach);
+    std::fill_n(row.data(), reach, from[0]);
+    std::fill_n(row.data() + reach + n, reach, from[n - 1]);
+    float* to = across.data() + r * n;
+    std::fill_n(to, n, 0.0F);
+    for (std::size_t k = 0; k < kernel.size(); ++k)
+      for (int c = 0; c < n; ++c) to[c] += kernel[k] * row[static_cast<std::size_t>(c) + k];
+  }
+  for (int r = 0; r < n; ++r) {
+    float* to = out.data() + r * n;
+    std::fill_n(to, n, 0.0F);
+    for (int k = -reach; k <= reach; ++k) {
+      const float* from = across.data() + std::clamp(r + k, 0, n - 1) * n;
+      const float weight = kernel[static_cast<std::size_t>(k + reach)];
+      for (int c = 0; c < n; ++c) to[c] += weight * from[c];
+    }
+  }
+}
+
+/// Texels of a 64×64 picture.
+void fill_texels(const Brightness& picture, std::vector<float>& texels) {
+  constexpr int n = PosePicture::side;
+  texels.resize(static_cast<std::size_t>(n) * n * 4);
+  float* out = texels.data();
+  for (int r = 0; r < n; ++r) {
+    const float* here = picture.data() + r * n;
+    const float* above = picture.data() + std::max(r - 1, 0) * n;
+    const float* below = picture.data() + std::min(r + 1, n - 1) * n;
+    for (int c = 0; c < n; ++c, out += 4) {
+      out[0] = here[c];
+      out[1] = 0.5F * (here[std::min(c + 1, n - 1)] - here[std::max(c - 1, 0)]);
+      out[2] = 0.5F * (below[c] - above[c]);
+      out[3] = 0.0F;
+    }
+  }
+}
+
+/// Eigenvectors of all dimensions that centred unit-energy pictures span.
+void span_of(const Eigen::MatrixXf& pictures, int side, PoseScale& scale, Eigen::MatrixXd& points) {
+  const Eigen::VectorXf mean = pictures.rowwise().mean();
+  const Eigen::MatrixXd centred = (pictures.colwise() - mean).cast<double>();
+  const SymmetricEigen found = symmetric_eigen(centred.transpose() * centred);
+  const Eigen::Index views = pictures.cols();
+  const double largest = std::max(found.values(0), 1e-12);
+  Eigen::Index kept = 0;
+  while (kept < views - 1 && found.values(kept) > 1e-6 * largest) {
+    ++kept;
+  }
+  kept = std::max<Eigen::Index>(kept, 1);
+  scale.side = side;
+  scale.basis.resize(pictures.rows(), kept);
+  for (Eigen::Index k = 0; k < kept; ++k) {
+    const Eigen::VectorXd vector = centred * found.vectors.col(k);
+    scale.basis.col(k) = (vector / std::max(vector.norm(), 1e-12)).cast<float>();
+  }
+  scale.mean = scale.basis.transpose() * mean;
+  points = scale.basis.cast<double>().transpose() * centred;
+}
+
+}  // namespace
+
+void make_pose_picture(const cv::Mat& picture, PosePicture& out) {
+  constexpr int n = PosePicture::side;
+  const cv::Mat* source = &picture;
+  cv::Mat resized;
+  if (picture.rows != n || picture.cols != n) {
+    cv::resize(picture, resized, cv::Size(n, n), 0.0, 0.0, cv::INTER_AREA);
+    source = &resized;
+  }
+  // On the stack: once a frame, no memory is taken.
+  std::array<std::uint8_t, std::size_t{n} * n> bytes;
+  cv::Mat grey(n, n, CV_8UC1, bytes.data());
+  source->channels() == 3 ? cv::cvtColor(*source, grey, cv::COLOR_BGR2GRAY) : source->copyTo(grey);
+  Brightness sharp;
+  for (std::size_t i = 0; i < sharp.size(); ++i) sharp[i] = static_cast<float>(bytes[i]) * (1.0F / 255.0F);
+  Brightness blurred;
+  blur(sharp, blurred);
+  fill_texels(sharp, out.sharp);
+  fill_texels(blurred, out.blurred);
+}
+
+void PoseScale::warp(const PosePicture& picture, const Misalignment& misalignment, bool derivatives,
+                     Eigen::MatrixXf& out) const {
+  const Sampler sampler{side > coarse_side ? picture.sharp.data() : picture.blurred.data()};
+  const auto n = static_cast<float>(PosePicture::side);
+  const float step = n / static_cast<float>(side);
+  const float enlarge = static_cast<float>(1.0 + misalignment.scale);
+  const float cosine = enlarge * static_cast<float>(std::cos(misalignment.rotation));
+  const float sine = enlarge * static_cast<float>(std::sin(misalignment.rotation));
+  const float middle = 0.5F * n;
+  const float cx = middle + n * static_cast<float>(misalignment.dx) - 0.5F;
+  const float cy = middle + n * static_cast<float>(misalignment.dy) - 0.5F;
+  out.resize(static_cast<Eigen::Index>(side) * side, 1 + Misalignment::unknowns);
+  float* value = out.col(0).data();
+  float* by_gain = out.col(1).data();
+  float* by_x = out.col(2).data();
+  float* by_y = out.col(3).data();
+  float* by_scale = out.col(4).data();
+  float* by_rotation = out.col(5).data();
+  // Four neighbouring pixels at a time.
+  static_assert(coarse_side % 4 == 0 && fine_side % 4 == 0);
+  const __m128 shrink = _mm_set1_ps(1.0F / enlarge);
+  int i = 0;
+  for (int r = 0; r < side; ++r) {
+    const float v = (static_cast<float>(r) + 0.5F) * step - middle;
+    for (int c = 0; c < side; c += 4, i += 4) {
+      const __m128 u = _mm_add_ps(_mm_set1_ps((static_cast<float>(c) + 0.5F) * step - middle),
+                                  _mm_mul_ps(_mm_set1_ps(step), _mm_setr_ps(0.0F, 1.0F, 2.0F, 3.0F)));
+      const __m128 du = _mm_sub_ps(_mm_mul_ps(_mm_set1_ps(cosine), u), _mm_set1_ps(sine * v));
+      const __m128 dv = _mm_add_ps(_mm_mul_ps(_mm_set1_ps(sine), u), _mm_set1_ps(cosine * v));
+      __m128 samples[4];
+      sampler.four(_mm_add_ps(_mm_set1_ps(cx), du), _mm_add_ps(_mm_set1_ps(cy), dv), samples);
+      _MM_TRANSPOSE4_PS(samples[0], samples[1], samples[2], samples[3]);
+      const __m128 gx = samples[1];
+      const __m128 gy = samples[2];
+      _mm_storeu_ps(value + i, samples[0]);
+      if (derivatives) {
+        _mm_storeu_ps(by_x + i, _mm_mul_ps(_mm_set1_ps(n), gx));
+        _mm_storeu_ps(by_y + i, _mm_mul_ps(_mm_set1_ps(n), gy));
+        _mm_storeu_ps(by_scale + i, _mm_mul_ps(_mm_add_ps(_mm_mul_ps(gx, du), _mm_mul_ps(gy, dv)), shrink));
+        _mm_storeu_ps(by_rotation + i, _mm_sub_ps(_mm_mul_ps(gy, du), _mm_mul_ps(gx, dv)));
+      }
+    }
+  }
+  const float energy = out.col(0).norm();
+  const float scale = static_cast<float>(1.0 + misalignment.gain) / std::max(energy, 1e-9F);
+  out.col(0) *= scale;
+  if (derivatives) {
+    out.rightCols(4) *= scale;
+    for (Eigen::Index k = 0; k < out.rows(); ++k) {
+      by_gain[k] = value[k] / static_cast<float>(1.0 + misalignment.gain);
+    }
+  }
+}
+
+PoseSpace PoseSpace::learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views) {
+  if (views.size() < 2) {
+    throw std::invalid_argument("a pose space needs at least 2 views, got " + std::to_string(views.size()));
+  }
+  PoseSpace space;
+  Eigen::MatrixXd points;
+  for (const int side : {coarse_side, fine_side}) {
+    PoseScale& scale = side == coarse_side ? space.coarse_ : space.fine_;
+    scale.side = side;
+    Eigen::MatrixXf pictures(static_cast<Eigen::Index>(side) * side, static_cast<Eigen::Index>(views.size()));
+    Eigen::MatrixXf warped;
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      scale.warp(views[v], {}, false, warped);
+      pictures.col(static_cast<Eigen::Index>(v)) = warped.col(0);
+    }
+    if (side == coarse_side) {
+      space.pixel_mean_ = pictures.rowwise().mean();
+    }
+    span_of(pictures, side, scale, points);
+    (side == coarse_side ? space.coarse_manifold_ : space.fine_manifold_) =
+        Manifold::interpolate(axes, points);
+    if (side == coarse_side && axes.size() == 1 && views.size() >= 4) {
+      for (std::size_t v = 0; v < views.size(); ++v) {
+        std::vector<SampleAxis> fewer = axes;
+        fewer[0].samples.erase(fewer[0].samples.begin() + static_cast<std::ptrdiff_t>(v));
+        Eigen::MatrixXd rest(points.rows(), points.cols() - 1);
+        const auto at = static_cast<Eigen::Index>(v);
+        rest << points.leftCols(at), points.rightCols(points.cols() - 1 - at);
+        const Manifold manifold = Manifold::interpolate(fewer, rest);
+        const double q = axes[0].samples[v];
+        space.left_out_errors_.push_back((manifold.evaluate({&q, 1}) - points.col(at)).squaredNorm());
+      }
+    }
+  }
+  space.make_samples();
+  return space;
+}
+
+PoseSpace PoseSpace::from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,
+                                Manifold coarse_manifold, Manifold fine_manifold) {
+  const auto fits = [](const PoseScale& scale, const Manifold& manifold) {
+    return scale.basis.rows() == static_cast<Eigen::Index>(scale.side) * scale.side &&
+           scale.mean.size() == scale.basis.cols() && manifold.dimensions() == scale.basis.cols();
+  };
+  if (coarse.side != coarse_side || fine.side > PosePicture::side || !fits(coarse, coarse_manifold) ||
+      !fits(fine, fine_manifold) || pixel_mean.size() != coarse.basis.rows()) {
+    throw std::invalid_argument("has a pose space whose parts do not fit together");
+  }
+  PoseSpace space;
+  space.coarse_ = std::move(coarse);
+  space.fine_ = std::move(fine);
+  space.pixel_mean_ = std::move(pixel_mean);
+  space.coarse_manifold_ = std::move(coarse_manifold);
+  space.fine_manifold_ = std::move(fine_manifold);
+  space.make_samples();
+  return space;
+}
+
+void PoseSpace::make_samples() {
+  const auto axes = coarse_manifold_->axes();
+  std::size_t total = 1;
+  sample_counts_.clear();
+  for (const SampleAxis& axis : axes) {
+    total *= axis.samples.size();
+  }
+  // Between neighbouring views several samples an axis, as many as the limit allows; one DOF gets 1° on a
+  // turntable.
+  const double room = std::pow(static_cast<double>(most_samples) / static_cast<double>(total),
+                               1.0 / static_cast<double>(axes.size()));
+  std::vector<std::vector<double>> values;
+  total = 1;
+  for (const SampleAxis& axis : axes) {
+    const auto views = axis.samples.size();
+    int count = 1;
+    if (views > 1) {
+      count = std::clamp(static_cast<int>(static_cast<double>(views) * room), static_cast<int>(views), 360);
+    }
+    const bool closed = axis.dof.periodic && views > 1;
+    std::vector<double> places;
+    places.reserve(static_cast<std::size_t>(count));
+    const double first = closed ? axis.dof.lower : axis.samples.front();
+    const double range = closed ? axis.dof.period() : axis.samples.back() - axis.samples.front();
+    for (int i = 0; i < count; ++i) {
+      places.push_back(count == 1 ? first : first + range * i / (closed ? count : count - 1));
+    }
+    sample_counts_.push_back(count);
+    total *= static_cast<std::size_t>(count);
+    values.push_back(std::move(places));
+  }
+  sample_poses_.resize(static_cast<Eigen::Index>(axes.size()), static_cast<Eigen::Index>(total));
+  samples_.resize(coarse_manifold_->dimensions(), static_cast<Eigen::Index>(total));
+  std::vector<double> q(axes.size());
+  for (std::size_t t = 0; t < total; ++t) {
+    std::size_t rest = t;
+    for (std::size_t a = axes.size(); a-- > 0;) {
+      q[a] = values[a][rest % values[a].size()];
+      rest /= values[a].size();
+    }
+    sample_poses_.col(static_cast<Eigen::Index>(t)) =
+        Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
+    samples_.col(static_cast<Eigen::Index>(t)) = coarse_manifold_->evaluate(q).cast<float>();
+  }
+}
+
+void PoseSpace::render(std::span<const double> q, Eigen::VectorXf& out) const {
+  out.noalias() = coarse_.basis * coarse_manifold_->evaluate(q).cast<float>();
+  out += pixel_mean_;
+}
+
+std::size_t PoseSpace::memory() const {
+  const auto floats = coarse_.basis.size() + fine_.basis.size() + samples_.size();
+  return static_cast<std::size_t>(floats) * sizeof(float);
+}
+
+}  // namespace eigenpose

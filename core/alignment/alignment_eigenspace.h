@@ -1,0 +1,87 @@
+#pragma once
+
+/// The eigenspace and manifold of one object's brightness, for finding its pose once it is known.
+///
+/// Appearances are grey, of unit energy and blurred, at two scales. All dimensions that the views span are
+/// kept, so that a point of the manifold is exactly the interpolated view.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "core/alignment/misalignment.h"
+#include "core/manifold/manifold.h"
+
+namespace eigenpose {
+
+/// A grey picture ready for alignment, and how it changes from pixel to pixel.
+struct PosePicture {
+  static constexpr int side = 64;
+  /// 64×64 texels of 4 floats: brightness 0…1, its central differences after x and y, and 0.
+  std::vector<float> blurred;  ///< Gaussian σ = 1.5 px: for the coarse scale
+  std::vector<float> sharp;    ///< for the fine scale
+};
+
+/// Makes `out` from a square CV_8UC1 or CV_8UC3 picture of any size.
+void make_pose_picture(const cv::Mat& picture, PosePicture& out);
+
+/// One scale of a pose space.
+struct PoseScale {
+  int side = 0;           ///< pixels a side: 32 (coarse) or 48 (fine)
+  Eigen::MatrixXf basis;  ///< side² × D
+  Eigen::VectorXf mean;   ///< basisᵀ · mean picture, D
+
+  /// Samples `picture` with a misalignment undone, to unit energy, together with its derivatives after each
+  /// unknown.
+  /// @param out side² × 6: the picture, then its derivatives after gain, dx, dy, scale and rotation.
+  void warp(const PosePicture& picture, const Misalignment& misalignment, bool derivatives,
+            Eigen::MatrixXf& out) const;
+};
+
+/// What is learned of one object's pose. Value type; const calls are thread-safe.
+class PoseSpace {
+ public:
+  PoseSpace() = default;
+  /// @param axes the grid of the views; @param views in the order of Manifold::interpolate (last axis
+  /// fastest).
+  /// @throws std::invalid_argument for fewer than two views or sizes that do not fit.
+  static PoseSpace learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views);
+
+  /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
+  static PoseSpace from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,
+                              Manifold coarse_manifold, Manifold fine_manifold);
+
+  [[nodiscard]] const PoseScale& coarse() const { return coarse_; }
+  /// Mean picture of the coarse scale, 32² pixels.
+  [[nodiscard]] const Eigen::VectorXf& pixel_mean() const { return pixel_mean_; }
+  /// The object's picture of unit energy at a pose: `out` gets 32² pixels of the coarse scale, row by row.
+  void render(std::span<const double> q, Eigen::VectorXf& out) const;
+  [[nodiscard]] const PoseScale& fine() const { return fine_; }
+  [[nodiscard]] const Manifold& coarse_manifold() const { return *coarse_manifold_; }
+  [[nodiscard]] const Manifold& fine_manifold() const { return *fine_manifold_; }
+  /// Grid of manifold samples: poses (m × T) and coarse points (D × T), last DOF fastest.
+  [[nodiscard]] const Eigen::MatrixXd& sample_poses() const { return sample_poses_; }
+  [[nodiscard]] const Eigen::MatrixXf& samples() const { return samples_; }
+  [[nodiscard]] const std::vector<int>& sample_counts() const { return sample_counts_; }
+  /// Squared error of the spline at each learned view when that view is left out (coarse scale).
+  [[nodiscard]] const std::vector<double>& left_out_errors() const { return left_out_errors_; }
+  [[nodiscard]] std::size_t memory() const;
+
+ private:
+  void make_samples();
+
+  PoseScale coarse_;
+  PoseScale fine_;
+  Eigen::VectorXf pixel_mean_;
+  std::optional<Manifold> coarse_manifold_;  ///< always set once learned
+  std::optional<Manifold> fine_manifold_;
+  Eigen::MatrixXd sample_poses_;
+  Eigen::MatrixXf samples_;
+  std::vector<int> sample_counts_;
+  std::vector<double> left_out_errors_;
+};
+
+}  // namespace eigenpose

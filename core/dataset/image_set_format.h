@@ -1,0 +1,39 @@
+#pragma once
+
+/// The two text files of an image set, shared by its reader and its writer.
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/base/workspace.h"
+#include "core/dataset/image_set.h"
+
+namespace eigenpose {
+
+/// What set.json says, its source apart.
+struct SetIndex {
+  std::string object;
+  Workspace workspace;
+  bool cropped = false;
+  bool complete = false;
+};
+
+/// What views.jsonl says.
+struct SetJournal {
+  std::vector<ViewRecord> views;
+  std::uintmax_t good_bytes = 0;  ///< up to the end of the last whole line
+};
+
+/// @throws FileError when set.json is missing or malformed.
+SetIndex read_set_index(const std::filesystem::path& folder);
+/// @throws FileError when views.jsonl is malformed; and for a complete set when it is missing, empty or cut
+/// off.
+SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, bool complete);
+/// The text of set.json.
+std::string set_index_text(const SetIndex& index, const nlohmann::json& source);
+
+}  // namespace eigenpose

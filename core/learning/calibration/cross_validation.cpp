@@ -1,0 +1,52 @@
+#include "core/learning/calibration/cross_validation.h"
+
+#include <cmath>
+
+#include "core/search/search.h"
+
+namespace eigenpose {
+
+std::vector<Fold> make_folds(const ObjectViews& object, std::size_t d) {
+  const auto& axis = object.axes[d];
+  const auto& all = axis.samples;
+  std::vector<Fold> folds;
+  if (all.size() < (axis.dof.periodic ? 6U : 5U)) return folds;
+  std::size_t inner = 1;
+  for (std::size_t a = d + 1; a < object.axes.size(); ++a) inner *= object.axes[a].samples.size();
+  for (std::size_t first = 0; first < 2; ++first) {
+    const auto leaves = [&](std::size_t i) {
+      const bool end = i == 0 || i + 1 == all.size();
+      return i % 2 == first && (axis.dof.periodic || !end);
+    };
+    Fold fold;
+    fold.axes = object.axes;
+    fold.axes[d].samples.clear();
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (!leaves(i)) fold.axes[d].samples.push_back(all[i]);
+    for (std::size_t cell = 0; cell < object.count; ++cell) {
+      const std::size_t i = (cell / inner) % all.size();
+      if (leaves(i)) fold.left_out_values.push_back(all[i]);
+      (leaves(i) ? fold.left_out : fold.kept).push_back(static_cast<Eigen::Index>(cell));
+    }
+    folds.push_back(std::move(fold));
+  }
+  return folds;
+}
+
+std::vector<double> left_out_errors(const ObjectViews& object, std::size_t d, int degree,
+                                    const std::function<FoldPoints(const Fold&)>& project) {
+  std::vector<double> errors;
+  for (const Fold& fold : make_folds(object, d)) {
+    const FoldPoints points = project(fold);
+    const std::vector<Manifold> manifold{Manifold::interpolate(fold.axes, points.kept, degree)};
+    const auto search = make_search("tree", manifold);
+    for (Eigen::Index i = 0; i < points.left_out.cols(); ++i) {
+      const double found = search->nearest(points.left_out.col(i).cast<float>(), 1).front().q[d];
+      errors.push_back(
+          std::abs(object.axes[d].dof.difference(found, fold.left_out_values[static_cast<std::size_t>(i)])));
+    }
+  }
+  return errors;
+}
+
+}  // namespace eigenpose

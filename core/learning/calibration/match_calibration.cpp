@@ -1,0 +1,352 @@
+#include "core/learning/calibration/match_calibration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+#include "core/alignment/misalignment.h"
+#include "core/base/error.h"
+#include "core/base/parallel.h"
+#include "core/recognition/aligned_match.h"
+#include "core/search/search.h"
+
+namespace eigenpose {
+namespace {
+
+/// A distance of so many scales of its object leaves no doubt; beyond, windows must agree.
+constexpr double sure_scales = 1.5;
+
+/// Error² of a spline grows by this much when the step doubles, where it can't be measured; and the bounds
+/// within which a measured growth is believed: the first power of the step, and the third.
+constexpr double default_growth = 4.0;
+constexpr double least_growth = 2.0;
+constexpr double most_growth = 64.0;
+/// Of new views, so many show what could not be seen coming at the step before.
+constexpr double sudden_share = 0.02;
+/// Moved views that say enough of all objects together.
+constexpr std::size_t most_moved = 4000;
+constexpr double most_sure_ratio = 0.3;
+constexpr double sure_margin = 0.8;
+
+/// Of the views, only every second one is kept, every fourth, every eighth.
+constexpr std::array<std::size_t, 3> thinnings{2, 4, 8};
+
+/// What one moved view shows.
+struct Probe {
+  double full = 0.0;  ///< squared distance to its own manifold
+  /// For each thinning, squared distance to the manifold of the kept views, minus `full`: the sum over the
+  /// DOFs. −1: there are too few views.
+  std::array<double, thinnings.size()> missed{};
+  double other =
+      std::numeric_limits<double>::infinity();  ///< distance to the nearest other object, aligned with it
+};
+
+/// An object's manifolds through some of its views: without the views at one value of a DOF, and with every
+/// n-th other value only, those that are n/2 steps from it and so on.
+class ThinnedManifolds {
+ public:
+  ThinnedManifolds(const ObjectViews& object, const Eigen::Ref<const Eigen::MatrixXd>& points, int degree)
+      : object_(object), points_(points), degree_(degree) {}
+
+  /// Squared distance to the manifold without value `from` of DOF `d`. Nothing where too few views are left.
+  std::optional<double> squared_distance(std::size_t d, std::size_t every, std::size_t from,
+                                         const Eigen::VectorXf& point);
+
+ private:
+  struct Thinned {
+    std::unique_ptr<Manifold> manifold;
+    std::unique_ptr<ManifoldSearch> search;
+  };
+
+  [[nodiscard]] Thinned thin(std::size_t d, std::size_t every, std::size_t from) const;
+
+  const ObjectViews& object_;
+  Eigen::Ref<const Eigen::MatrixXd> points_;
+  int degree_;
+  std::map<std::array<std::size_t, 3>, Thinned> made_;
+};
+
+/// Of few views only the one is left out.
+bool too_few_to_thin(std::size_t values) {
+  return values < 6;
+}
+
+ThinnedManifolds::Thinned ThinnedManifolds::thin(std::size_t d, std::size_t every, std::size_t from) const {
+  const std::vector<double>& all = object_.axes[d].samples;
+  const bool closed = object_.axes[d].dof.periodic;
+  const auto kept = [&](std::size_t i) {
+    // The ends of an open DOF stay: beyond them there is no manifold.
+    if (!closed && (i == 0 || i + 1 == all.size())) return true;
+    return too_few_to_thin(all.size()) ? i != from : (i + every - from) % every == every / 2;
+  };
+  std::vector<SampleAxis> axes = object_.axes;
+  axes[d].samples.clear();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (kept(i)) axes[d].samples.push_back(all[i]);
+  if (axes[d].samples.size() < 2) return {};
+  std::size_t inner = 1;
+  for (std::size_t a = d + 1; a < object_.axes.size(); ++a) inner *= object_.axes[a].samples.size();
+  std::vector<Eigen::Index> cells;
+  for (std::size_t cell = 0; cell < object_.count; ++cell)
+    if (kept(cell / inner % all.size())) cells.push_back(static_cast<Eigen::Index>(cell));
+  Thinned result;
+  result.manifold =
+      std::make_unique<Manifold>(Manifold::interpolate(axes, points_(Eigen::all, cells), degree_));
+  result.search = make_search("tree", {result.manifold.get(), 1});
+  return result;
+}
+
+std::optional<double> ThinnedManifolds::squared_distance(std::size_t d, std::size_t every, std::size_t from,
+                                                         const Eigen::VectorXf& point) {
+  const std::size_t values = object_.axes[d].samples.size();
+  if (values < 3 || (every > 2 && values < 3 * every)) return std::nullopt;
+  if (!object_.axes[d].dof.periodic && (from == 0 || from + 1 == values)) return std::nullopt;
+  // Values a whole number of thinned steps apart leave the same views.
+  if (!too_few_to_thin(values)) from %= every;
+  const std::array<std::size_t, 3> key{d, every, from};
+  auto made = made_.find(key);
+  if (made == made_.end()) made = made_.emplace(key, thin(d, every, from)).first;
+  if (!made->second.search) return std::nullopt;
+  std::array<ClosestPoint, 1> nearest;
+  if (made->second.search->nearest_into(point, nearest) == 0) return std::nullopt;
+  return nearest[0].distance * nearest[0].distance;
+}
+
+Misalignment random_misalignment(const MatchCalibrationOptions& options, std::mt19937& random) {
+  // std::uniform_real_distribution differs between libraries; the generator does not.
+  const auto each_way = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
+  Misalignment m;
+  m.dx = options.shift * each_way();
+  m.dy = options.shift * each_way();
+  m.scale = options.scale * each_way();
+  m.rotation = options.turn_deg * std::numbers::pi / 180.0 * each_way();
+  return m;
+}
+
+/// Moves, aligns and measures every view of one object.
+std::vector<Probe> probe_object(const Model& model, const ViewStore& views, const Eigen::MatrixXd& all_points,
+                                std::size_t o, const ManifoldSearch& search,
+                                const MatchCalibrationOptions& options, std::size_t copies) {
+  const ObjectViews& object = views.objects()[o];
+  const Eigen::MatrixXd points =
+      all_points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count));
+  ThinnedManifolds thinned(object, points, model.objects[o].manifold.degree());
+  const int size = model.normalization.size;
+  const int bands = picture_bands(model.normalization);
+  const std::size_t dofs = object.axes.size();
+
+  AlignedMatch match(model, search, std::numeric_limits<double>::infinity());
+  std::mt19937 random(static_cast<std::uint32_t>(o + 1));
+  const std::size_t length = picture_length(model.normalization);
+  std::vector<float> view(length);
+  std::vector<float> moved(length);
+  std::vector<std::uint8_t> bytes(length);
+  PosePicture picture;
+  std::vector<Probe> probes;
+  for (std::size_t v = 0; v < object.count; ++v) {
+    picture_numbers(views.picture(object.first + v), view);
+    for (std::size_t copy = 0; copy < copies; ++copy) {
+      undo_misalignment(view, size, bands, random_misalignment(options, random), moved);
+      quantize(moved, bytes);
+      make_pose_picture(cv::Mat(size, size, CV_8UC(bands), bytes.data()), picture);
+      const AlignedPose& pose = match.align(picture, o).front();
+      const RealignedDistance distance = match.distance(moved, pose.misalignment, o);
+      Probe probe;
+      probe.full = distance.own * distance.own;
+      const std::size_t other = distance.other ? distance.other->manifold : o;
+      for (std::size_t t = 0; t < thinnings.size(); ++t) {
+        std::size_t inner = object.count;
+        for (std::size_t d = 0; d < dofs && probe.missed[t] >= 0.0; ++d) {
+          const std::size_t values = object.axes[d].samples.size();
+          inner /= values;
+          const auto squared = thinned.squared_distance(d, thinnings[t], v / inner % values, match.point());
+          probe.missed[t] = squared ? probe.missed[t] + std::max(0.0, *squared - probe.full) : -1.0;
+        }
+      }
+      if (other != o)
+        probe.other = match.distance(moved, match.align(picture, other).front().misalignment, other).own;
+      probes.push_back(probe);
+    }
+  }
+  return probes;
+}
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// By what factors the spline's squared error grows when the step doubles, over all objects.
+struct Growth {
+  double to_learned = default_growth;  ///< from the learned step to its double
+  double to_half = default_growth;     ///< from there to the fourfold
+};
+
+Growth error_growth(const std::vector<std::vector<Probe>>& probes) {
+  std::array<double, thinnings.size() - 1> growth{};
+  for (std::size_t t = 0; t < growth.size(); ++t) {
+    std::vector<double> fine;
+    std::vector<double> coarse;
+    for (const auto& object : probes)
+      for (const Probe& probe : object)
+        if (probe.missed[t] >= 0.0 && probe.missed[t + 1] >= 0.0) {
+          fine.push_back(probe.missed[t]);
+          coarse.push_back(probe.missed[t + 1]);
+        }
+    if (fine.empty()) continue;
+    growth[t] = std::clamp(median(coarse) / std::max(median(fine), 1e-12), least_growth, most_growth);
+  }
+  if (growth[0] == 0.0) return {};
+  // Coarse steps miss so much that doubling them hardly adds: growth itself grows towards finer ones.
+  const double next = growth[1] == 0.0 ? growth[0] : growth[0] * growth[0] / growth[1];
+  return {std::clamp(next, growth[0], most_growth), growth[0]};
+}
+
+/// The length that an object's distances are measured in: their mean and their largest tell it together.
+double scale_of(const std::vector<double>& distances) {
+  const double sum = std::accumulate(distances.begin(), distances.end(), 0.0);
+  return std::max(1e-6, sum / static_cast<double>(distances.size()) +
+                            0.5 * *std::max_element(distances.begin(), distances.end()));
+}
+
+double mean(const std::vector<double>& values) {
+  return values.empty()
+             ? 0.0
+             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// What the probes of one object say, with the spline's error growing as over all objects.
+MatchEvidence weigh(const std::vector<Probe>& probes, const Growth& growth) {
+  std::vector<double> expected;
+  std::vector<double> half;
+  std::vector<double> quarter;
+  double squares = 0.0;
+  MatchEvidence result;
+  for (const Probe& probe : probes) {
+    const double missed = std::max(0.0, probe.missed[0]);
+    // Generous: as if halving the step helped no more than the time before.
+    const double fresh = probe.full + missed / growth.to_half;
+    squares += fresh;
+    expected.push_back(std::sqrt(fresh));
+    result.learned.push_back(probe.full);
+    if (probe.missed[0] >= 0.0) half.push_back(probe.missed[0]);
+    if (probe.missed[1] >= 0.0) quarter.push_back(probe.missed[1]);
+    result.others.push_back(probe.other);
+    // Had the view not been learned, another object would have been nearer: such a lead must not count.
+    const double left_out = probe.full + missed;
+    if (probe.other * probe.other < left_out)
+      result.false_lead = std::min(result.false_lead, probe.other * probe.other / left_out);
+  }
+  result.scale = scale_of(expected);
+  result.typical_distance = std::sqrt(squares / static_cast<double>(probes.size()));
+  // Of a few views it is not known; as much as it misses where it was learned is as good a guess as any.
+  result.missed = half.empty() ? growth.to_learned * mean(result.learned) : mean(half);
+  result.growth = growth.to_learned;
+  const double mean_expected = quarter.empty() ? mean(half) : mean(quarter) / growth.to_half;
+  for (const double missed : half) result.factors.push_back(missed / std::max(mean_expected, 1e-12));
+  return result;
+}
+
+/// The distance that a share `rate` of an object's new views exceeds. @param factors of all objects, rising.
+double exceeded_by(const MatchEvidence& own, const std::vector<double>& factors, double rate) {
+  const auto all = static_cast<double>(own.learned.size() * factors.size());
+  /// Share of the views whose squared distance exceeds this where the spline misses so much on average.
+  const auto beyond = [&](double squared, double missed) {
+    std::ptrdiff_t count = 0;
+    for (const double learned : own.learned) {
+      const double factor = (squared - learned) / std::max(missed, 1e-12);
+      count += factors.end() - std::upper_bound(factors.begin(), factors.end(), factor);
+    }
+    return static_cast<double>(count) / all;
+  };
+  double low = 0.0;
+  double high = *std::max_element(own.learned.begin(), own.learned.end()) + own.missed * factors.back();
+  for (int halvings = 0; halvings < 40; ++halvings) {
+    const double middle = 0.5 * (low + high);
+    const double share = (1.0 - sudden_share) * beyond(middle, own.missed / own.growth) +
+                         sudden_share * beyond(middle, own.missed);
+    (share > rate ? low : high) = middle;
+  }
+  return std::sqrt(high);
+}
+
+}  // namespace
+
+std::vector<MatchEvidence> measure_match(const Model& model, const ViewStore& views,
+                                         const Eigen::MatrixXd& points,
+                                         const MatchCalibrationOptions& options, const Progress& progress,
+                                         std::stop_token stop) {
+  if (!(options.rate >= 0.0 && options.rate <= 0.5 && options.stranger_rate >= 0.0 &&
+        options.stranger_rate <= 1.0))
+    throw std::invalid_argument("the rate of wrong rejections is " + std::to_string(options.rate) +
+                                ", allowed are 0 to 0.5; that of accepted strangers is " +
+                                std::to_string(options.stranger_rate) + ", allowed are 0 to 1");
+  if (options.moved_views < 1) throw std::invalid_argument("calibration needs at least one moved view");
+  const std::size_t copies = std::clamp<std::size_t>(most_moved / views.count(), 1, options.moved_views);
+  std::vector<Manifold> manifolds;
+  for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
+  const auto search = make_search("tree", manifolds);
+  std::vector<std::vector<Probe>> probes(manifolds.size());
+  std::mutex progress_mutex;
+  std::size_t done = 0;  // guarded by progress_mutex
+  parallel_for(manifolds.size(), options.threads, [&](std::size_t o) {
+    if (stop.stop_requested()) throw Interrupted();
+    probes[o] = probe_object(model, views, points, o, *search, options, copies);
+    const std::lock_guard lock(progress_mutex);
+    if (progress) progress({"calibrating", ++done, manifolds.size()});
+  });
+  const Growth growth = error_growth(probes);
+  std::vector<MatchEvidence> evidence;
+  evidence.reserve(probes.size());
+  for (std::size_t o = 0; o < probes.size(); ++o) {
+    evidence.push_back(weigh(probes[o], growth));
+    evidence.back().views = views.objects()[o].count;
+  }
+  return evidence;
+}
+
+MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
+                                 const MatchCalibrationOptions& options, std::optional<std::size_t> without) {
+  std::size_t views = 0;
+  std::vector<double> factors;
+  std::vector<double> others;
+  MatchThresholds result;
+  result.sure_ratio = most_sure_ratio;
+  for (std::size_t o = 0; o < evidence.size(); ++o) {
+    if (o == without) continue;
+    const MatchEvidence& own = evidence[o];
+    views += own.views;
+    factors.insert(factors.end(), own.factors.begin(), own.factors.end());
+    others.insert(others.end(), own.others.begin(), own.others.end());
+    result.sure_ratio = std::min(result.sure_ratio, sure_margin * own.false_lead);
+  }
+  if (factors.empty()) factors.push_back(1.0);
+  std::sort(factors.begin(), factors.end());
+  std::sort(others.begin(), others.end());
+  result.smallest_rate = 1.0 / (static_cast<double>(views) + 1.0);
+  const double rate = std::max(options.rate, result.smallest_rate);
+  const auto nearest = static_cast<std::size_t>(options.stranger_rate * static_cast<double>(others.size()));
+  const double cap = others[std::min(nearest, others.size() - 1)];
+  for (std::size_t o = 0; o < evidence.size(); ++o) {
+    const double scale = evidence[o].scale;
+    const double known = o == without ? 0.0 : exceeded_by(evidence[o], factors, rate);
+    const double rejection = std::min(known, std::max(cap, scale));
+    result.rejection_distance.push_back(rejection);
+    // As near as strangers come, windows are asked, however far known views may be.
+    result.sure_distance.push_back(std::min({rejection, sure_scales * scale, cap}));
+  }
+  return result;
+}
+
+}  // namespace eigenpose

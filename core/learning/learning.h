@@ -1,0 +1,76 @@
+#pragma once
+
+/// From image sets to a model (sections 3 and 4 of the paper).
+
+#include <filesystem>
+#include <span>
+#include <stop_token>
+#include <string>
+
+#include "core/base/progress.h"
+#include "core/learning/calibration/distance_calibration.h"
+#include "core/learning/calibration/match_calibration.h"
+#include "core/learning/calibration/occlusion_calibration.h"
+#include "core/learning/calibration/parts_calibration.h"
+#include "core/learning/training_views.h"
+#include "core/model/model.h"
+#include "core/subspace/solver.h"
+
+namespace eigenpose {
+
+struct LearningOptions {
+  NormalizationOptions normalization;
+  SolverOptions solver;
+  int spline_degree = 2;  ///< 1, 2 or 3
+  RejectionOptions rejection;
+  /// Without parts, learn each object's own eigenspace too: for a second look where two objects are close,
+  /// and for pose where it is better.
+  bool object_spaces = true;
+  /// Learn windows and pose spaces too: matching that bears covers and misalignment. Without, only the whole
+  /// region is matched. They look at brightness whatever the image type is; of range there are none.
+  bool parts = true;
+  MatchCalibrationOptions match;        ///< thresholds of the whole region, with parts
+  PartsCalibrationOptions calibration;  ///< thresholds of windows
+  unsigned threads = 0;                 ///< 0: all cores. The model does not depend on it.
+  /// Memory for views and solver, bytes; 0 means no limit. Views that do not fit are kept on disk and read in
+  /// tiles. Beside it stand the model itself (windows and own spaces grow with the views) and a few pictures
+  /// a thread.
+  std::size_t memory_limit = 0;
+  std::filesystem::path scratch_folder = {};  ///< where that disk is; empty: the folder for temporary files
+  /// A file to keep the views and their inner products in, so that objects can join and leave the model later
+  /// (kept_views.h); empty: nowhere. It is there when `learn` returns.
+  std::filesystem::path kept_views = {};
+  /// Kept in the model's provenance.
+  std::string image_sets;
+  std::string program_version;
+};
+
+struct LearningReport {
+  std::size_t views = 0;
+  SolverReport solver;
+  std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
+  std::vector<MatchEvidence> match;         ///< the same of the aligned match; empty without parts
+  std::vector<CoveredEvidence> covered;  ///< learned views as strangers to the windows; empty without parts
+  Duration normalize_time{};
+  Duration eigenspace_time{};
+  Duration manifold_time{};
+  Duration rejection_time{};
+  Duration object_space_time{};
+  Duration parts_time{};  ///< windows, pose spaces and their calibration
+  Duration total_time{};
+};
+
+/// Learns a model of all objects of `sets`. `options.normalization.cropped` is decided here: true when every
+/// set is cropped.
+/// @throws FileError, Error (too few views, no grid of poses, two sets of one object, nothing to be seen),
+/// std::invalid_argument for options out of range, Interrupted.
+Model learn(std::span<const TrainingSet> sets, LearningOptions options, LearningReport* report = nullptr,
+            const Progress& progress = {}, const std::stop_token& stop = {});
+
+/// All views of every set.
+std::vector<TrainingSet> all_views(std::span<const ImageSet> sets);
+
+/// K × M: every appearance of `source` projected. On all cores.
+Eigen::MatrixXd project_all(const AppearanceSource& source, const Eigenspace& eigenspace, unsigned threads);
+
+}  // namespace eigenpose

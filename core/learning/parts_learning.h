@@ -1,0 +1,35 @@
+#pragma once
+
+/// Learning what partial matching and alignment need, from normalised views.
+
+#include <functional>
+#include <stop_token>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "core/base/progress.h"
+#include "core/manifold/manifold.h"
+#include "core/model/parts_model.h"
+
+namespace eigenpose {
+
+/// The views of one object: square 8-bit pictures in the order of its grid (last axis fastest).
+struct PartsViews {
+  std::vector<SampleAxis> axes;
+  std::size_t count = 0;
+  std::function<cv::Mat(std::size_t)> view;  ///< called from several threads
+};
+
+struct PartsLearningOptions {
+  /// Views farther apart than this share of a turn (20°) get foreshortened and mirrored companions.
+  double sparse_step = 20.0 / 360.0;
+  unsigned threads = 0;
+};
+
+/// Learns windows and pose spaces. Thresholds come from calibrate_parts.
+/// @throws std::invalid_argument without objects or views; Interrupted.
+PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
+                       const Progress& progress = {}, std::stop_token stop = {});
+
+}  // namespace eigenpose

@@ -1,0 +1,242 @@
+#include "core/learning/training_archive.h"
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/dataset/natural_order.h"
+#include "core/model/hdf5_file.h"
+#include "core/model/hdf5_links.h"
+#include "core/model/sealed_file.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr SealedFormat views_format{"eigenpose views\n", 1,
+                                    "is no file of kept views; 'eigenpose learn --keep-views' makes them",
+                                    "learn the model again from its image sets, with --keep-views"};
+
+void write_options(const Hdf5Group& group, const LearningOptions& options) {
+  group.write("solver", options.solver.solver);
+  group.write("components", static_cast<std::int64_t>(options.solver.components));
+  group.write("energy", options.solver.energy.value_or(0.0));
+  group.write("spline_degree", std::int64_t{options.spline_degree});
+  group.write("object_spaces", std::int64_t{options.object_spaces});
+  group.write("parts", std::int64_t{options.parts});
+  group.write("image_sets", options.image_sets);
+  write_normalization(group.make_group("normalization"), options.normalization);
+}
+
+LearningOptions read_options(const Hdf5Group& group) {
+  LearningOptions options;
+  options.solver.solver = group.read_text("solver");
+  options.solver.components = static_cast<std::size_t>(group.read_integer("components"));
+  if (const double energy = group.read_double("energy"); energy > 0.0) options.solver.energy = energy;
+  options.spline_degree = static_cast<int>(group.read_integer("spline_degree"));
+  options.object_spaces = group.read_bool("object_spaces");
+  options.parts = group.read_bool("parts");
+  options.image_sets = group.read_text("image_sets");
+  options.normalization = read_normalization(group.open_group("normalization"));
+  return options;
+}
+
+void write_object(const Hdf5Group& group, const ViewStore& views, const ObjectViews& object) {
+  group.write("name", object.object);
+  group.write("cropped", std::int64_t{object.cropped});
+  group.write("pictures", std::span<const std::uint8_t>(views.pictures(object.first, object.count)));
+  Eigen::MatrixXf energies(1, static_cast<Eigen::Index>(object.count));
+  Eigen::MatrixXd extents = Eigen::MatrixXd::Zero(2, energies.cols());
+  for (std::size_t i = 0; i < object.count; ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    energies(0, column) = views.energy(object.first + i);
+    if (!object.cropped) extents.col(column) << object.extents[i].width, object.extents[i].height;
+  }
+  group.write("energies", energies);
+  group.write("extents", extents);
+  const Hdf5Group axes = group.make_group("axes");
+  for (std::size_t a = 0; a < object.axes.size(); ++a)
+    write_axis(axes.make_group(numbered(a)), object.axes[a]);
+}
+
+/// Everything but pictures and energies.
+ObjectViews read_object(const Hdf5Group& group, std::size_t first) {
+  ObjectViews object;
+  object.object = group.read_text("name");
+  object.cropped = group.read_bool("cropped");
+  object.first = first;
+  object.count = 1;
+  std::vector<Dof> dofs;
+  const Hdf5Group axes = group.open_group("axes");
+  for (const std::string& name : axes.group_names()) {
+    object.axes.push_back(read_axis(axes.open_group(name)));
+    object.count *= object.axes.back().samples.size();
+    dofs.push_back(object.axes.back().dof);
+  }
+  object.workspace = Workspace(std::move(dofs));
+  const Eigen::MatrixXd extents = group.read_doubles("extents");
+  if (extents.rows() != 2 || static_cast<std::size_t>(extents.cols()) != object.count)
+    throw Hdf5Failure("has objects whose parts do not fit together");
+  for (Eigen::Index i = 0; i < extents.cols(); ++i)
+    object.extents.emplace_back(static_cast<int>(extents(0, i)), static_cast<int>(extents(1, i)));
+  return object;
+}
+
+/// Calls `work` with the library to itself; what fails there is the file's fault.
+template <typename Work>
+auto with_hdf5(const std::filesystem::path& file, const Work& work) {
+  const auto refuse = [&](const char* what) {
+    return FileError(file, std::string(what) + "; " + std::string(views_format.remedy));
+  };
+  try {
+    const Hdf5Lock lock;
+    return work();
+  } catch (const Hdf5Failure& failure) {
+    throw refuse(failure.what());
+  } catch (const std::invalid_argument& failure) {
+    throw refuse(failure.what());
+  }
+}
+
+ConfigError not_there(const KeptViews& kept, const std::string& name) {
+  std::string text = "there is no object \"" + name + "\" to remove; there are:";
+  for (const ObjectViews& object : kept.objects()) {
+    text += object.first == 0 ? " " : ", ";
+    text += object.object;
+  }
+  return ConfigError(text);
+}
+
+std::filesystem::path checked(std::filesystem::path file) {
+  if (!std::filesystem::exists(file))
+    throw FileError(file, "there are no kept views; " + std::string(views_format.remedy));
+  check_seal(views_format, file);
+  return file;
+}
+
+}  // namespace
+
+/// The open file. To be made, used and destroyed under an Hdf5Lock.
+struct KeptViews::File {
+  explicit File(const std::filesystem::path& path) : handle(open_hdf5(path)), root(root_of(handle)) {}
+  Hdf5Handle handle;
+  Hdf5Group root;
+};
+
+KeptViews::KeptViews(std::filesystem::path file) : file_(checked(std::move(file))) {
+  with_hdf5(file_, [&] {
+    open_ = std::make_unique<File>(file_);
+    created_ = open_->root.read_text("created");
+    options_ = read_options(open_->root.open_group("options"));
+    const Hdf5Group objects = open_->root.open_group("objects");
+    std::size_t first = 0;
+    for (const std::string& name : objects.group_names()) {
+      objects_.push_back(read_object(objects.open_group(name), first));
+      first += objects_.back().count;
+    }
+  });
+}
+
+KeptViews::~KeptViews() {
+  const Hdf5Lock lock;
+  open_.reset();
+}
+
+bool KeptViews::belong_to(const Model& model) const {
+  return created_ == model.provenance.created &&
+         std::equal(objects_.begin(), objects_.end(), model.objects.begin(), model.objects.end(),
+                    [](const ObjectViews& views, const ModelObject& object) {
+                      return views.object == object.name && views.count == object.views;
+                    });
+}
+
+void KeptViews::read(std::size_t o, std::span<std::uint8_t> pictures, std::span<float> energies) const {
+  with_hdf5(file_, [&] {
+    const Hdf5Group object = open_->root.open_group("objects").open_group(numbered(o));
+    object.read_bytes("pictures", pictures);
+    const Eigen::MatrixXf read = object.read_floats("energies");
+    if (read.rows() != 1 || static_cast<std::size_t>(read.cols()) != energies.size())
+      throw Hdf5Failure("has objects whose parts do not fit together");
+    std::copy_n(read.data(), energies.size(), energies.data());
+  });
+}
+
+Eigen::MatrixXd KeptViews::products() const {
+  return with_hdf5(file_, [&] {
+    if (!open_->root.has("products")) return Eigen::MatrixXd();
+    Eigen::MatrixXd products = open_->root.read_doubles("products");
+    const auto count = objects_.empty() ? 0 : objects_.back().first + objects_.back().count;
+    if (products.rows() != products.cols() || static_cast<std::size_t>(products.rows()) != count)
+      throw Hdf5Failure("has products that do not fit its views");
+    return products;
+  });
+}
+
+KeptViewsWriter::KeptViewsWriter(const std::filesystem::path& file, const ViewStore& views,
+                                 const LearningOptions& options, std::string created)
+    : target_(file), file_(file), views_(views), options_(options), created_(std::move(created)) {}
+
+void KeptViewsWriter::write(const Eigen::MatrixXd& products) {
+  try {
+    const Hdf5Lock lock;
+    const Hdf5Handle file = create_hdf5(file_.part(), seal_size);
+    const Hdf5Group root = root_of(file);
+    root.write("created", created_);
+    write_options(root.make_group("options"), options_);
+    const Hdf5Group objects = root.make_group("objects");
+    for (std::size_t o = 0; o < views_.objects().size(); ++o)
+      write_object(objects.make_group(numbered(o)), views_, views_.objects()[o]);
+    if (products.size() > 0) root.write("products", products);
+  } catch (const Hdf5Failure& failure) {
+    throw FileError(target_, failure.what());
+  }
+  seal_file(views_format, file_.part());
+  written_ = true;
+}
+
+void KeptViewsWriter::commit() {
+  if (!written_) write({});
+  file_.commit();
+}
+
+std::vector<TrainingSet> updated_sets(const KeptViews& kept, std::span<const std::string> leaving,
+                                      std::span<const ImageSet> joining) {
+  for (const std::string& name : leaving)
+    if (std::none_of(kept.objects().begin(), kept.objects().end(),
+                     [&](const ObjectViews& object) { return object.object == name; }))
+      throw not_there(kept, name);
+  std::vector<TrainingSet> sets;
+  for (std::size_t o = 0; o < kept.objects().size(); ++o)
+    if (std::find(leaving.begin(), leaving.end(), kept.objects()[o].object) == leaving.end())
+      sets.push_back({nullptr, {}, &kept, o});
+  const std::size_t staying = sets.size();
+  for (const ImageSet& set : joining) {
+    const auto end = sets.begin() + static_cast<std::ptrdiff_t>(staying);
+    if (std::any_of(sets.begin(), end, [&](const TrainingSet& s) { return s.object() == set.object(); }))
+      throw ConfigError("object \"" + set.object() + "\" is learned already; remove it to learn it anew");
+    sets.push_back({&set, {}});
+  }
+  std::stable_sort(sets.begin(), sets.end(), [](const TrainingSet& a, const TrainingSet& b) {
+    return NaturalLess()(a.object(), b.object());
+  });
+  return sets;
+}
+
+KnownProducts known_products(std::span<const TrainingSet> sets, const ViewStore& views) {
+  KnownProducts known;
+  const auto first =
+      std::find_if(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.kept != nullptr; });
+  if (first == sets.end()) return known;
+  known.products = first->kept->products();
+  if (known.products.size() == 0) return known;
+  for (std::size_t s = 0; s < sets.size(); ++s)
+    for (std::size_t i = 0; i < views.objects()[s].count; ++i)
+      known.rows.push_back(
+          sets[s].kept == first->kept
+              ? static_cast<Eigen::Index>(first->kept->objects()[sets[s].kept_object].first + i)
+              : -1);
+  return known;
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,436 @@
+#include "core/recognition/parts_recognizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/alignment/masked_alignment.h"
+#include "core/alignment/misalignment.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr double window_count = QueryWindows::count;  // each window counts as one observation
+constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
+constexpr std::size_t most_revoted = 3;
+constexpr std::size_t most_covered_starts = 6;  // views whose neighbourhood is looked at first
+/// Of these so many are followed to the end, unless they are so much worse than the best of all objects.
+constexpr std::size_t most_covered_poses = 3;
+constexpr double hopeless_merit = 20.0;
+/// What votes, visible pixels and unexplained ones count for a covered pose; developed on learned views.
+constexpr double vote_merit = 2.0 * window_count;
+constexpr double visible_merit = 0.15 * window_count;
+constexpr double unexplained_merit = 0.1;
+/// Of a covered region, so many objects with this share of the most votes, or more, are looked at pixel by
+/// pixel.
+constexpr std::size_t most_rivals = 4;
+constexpr double rival_votes = 0.8;
+/// A second object with this share of the votes, or with so much less merit, may be it as well.
+constexpr double tied_votes = 0.97;
+constexpr double tied_merit = 2.0;
+/// What votes of the visible windows, over those of the background, weigh beside the logarithm of the cost.
+constexpr double vote_evidence = 5.0;
+constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
+constexpr double masked_reach = 12.0 / 360.0;
+
+/// Votes of the learned views next to a pose: the best of those within one step in every DOF.
+double votes_near(const std::vector<float>& votes, const PartsObject& object, const PoseSpace& space,
+                  std::span<const double> q) {
+  const auto axes = space.coarse_manifold().axes();
+  double best = 0.0;
+  for (std::size_t c = 0; c < object.candidates.size(); ++c) {
+    if (object.candidates[c].mirrored) {
+      continue;
+    }
+    std::size_t rest = static_cast<std::size_t>(object.candidates[c].view);
+    bool near = true;
+    for (std::size_t a = axes.size(); a-- > 0 && near;) {
+      const std::size_t count = axes[a].samples.size();
+      const double sample = axes[a].samples[rest % count];
+      rest /= count;
+      // One learned step, with room for uneven ones.
+      near = std::fabs(axes[a].dof.difference(q[a], sample)) <=
+             1.01 * axes[a].dof.period() / static_cast<double>(count);
+    }
+    if (near) {
+      best = std::max(best, static_cast<double>(votes[c]));
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+/// A pose of a covered object that is being followed.
+struct CoveredStart {
+  MaskedPose pose;
+  double votes = 0.0;
+  double merit = 0.0;
+};
+
+/// An object that may be seen behind a cover.
+struct CoveredAnswer {
+  PartsAnswer answer;
+  std::vector<float> trust;          ///< of the pixels, by the object's best view
+  std::vector<CoveredStart> starts;  ///< best first, not empty
+};
+
+struct PartsRecognizer::Impl {
+  explicit Impl(const PartsModel& learned)
+      : model(learned),
+        mapper(learned.background),
+        matcher(learned.objects, learned.scale, learned.voting),
+        rematcher(learned.objects, learned.scale, learned.voting),
+        aligner([&] {
+          options.noise = learned.noise;
+          return options;
+        }()),
+        masked_aligner(options) {
+    everything.resize(learned.objects.size());
+    std::iota(everything.begin(), everything.end(), std::size_t{0});
+  }
+
+  const PartsModel& model;
+  AlignmentOptions options;
+  CellMapper mapper;
+  PartialMatcher matcher;    ///< of the picture as it is
+  PartialMatcher rematcher;  ///< of the picture aligned with one pose
+  PoseAligner aligner;
+  MaskedAligner masked_aligner;
+  std::vector<std::size_t> everything;
+  cv::Mat picture;
+  cv::Mat numbers;  ///< of the picture, once they were asked for
+  bool numbers_made = false;
+  cv::Mat aligned_numbers;
+  cv::Mat aligned;
+  CellMap map;
+  QueryWindows windows;  ///< of the picture, once they were asked for
+  bool windows_made = false;
+  QueryWindows aligned_windows;
+  PosePicture pose_picture;  ///< likewise
+  bool pose_picture_made = false;
+  std::vector<float> plain_votes;    ///< of one object's views, in the picture
+  std::vector<float> aligned_votes;  ///< the same in the aligned one
+  std::vector<float> likeness;
+  std::vector<float> background;
+
+  const PosePicture& posed();
+  const std::vector<float>& votes_of(std::size_t object);
+  double share_after_alignment(std::size_t object, const PartsPose& pose);
+  double foreign_share(std::size_t object, int candidate);
+  /// The same of the view with most votes.
+  double covered_share(std::size_t object, const std::vector<float>& plain);
+  PartsAnswer find_poses(std::size_t object, const std::vector<float>& plain, double covered);
+  CoveredAnswer approach_covered(std::size_t object, const std::vector<float>& plain, double covered);
+  /// Follows the starts of this merit and more to the end.
+  void refine_covered(CoveredAnswer& found, double hopeless);
+  void identify_covered(std::span<const PartialVote> votes, PartsIdentification& found);
+  /// The pose of a candidate, moved by the parabola through its neighbours' votes.
+  [[nodiscard]] PoseNumbers voted_pose(std::size_t object, const std::vector<float>& plain,
+                                       int candidate) const;
+  [[nodiscard]] std::vector<float> pixel_trust() const;
+};
+
+const PosePicture& PartsRecognizer::Impl::posed() {
+  if (!pose_picture_made) make_pose_picture(picture, pose_picture);
+  pose_picture_made = true;
+  return pose_picture;
+}
+
+const std::vector<float>& PartsRecognizer::Impl::votes_of(std::size_t object) {
+  matcher.plain_votes(windows, object, plain_votes);
+  return plain_votes;
+}
+
+double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const PartsPose& pose) {
+  if (!numbers_made) picture.convertTo(numbers, CV_32F);
+  numbers_made = true;
+  aligned_numbers.create(numbers.size(), numbers.type());
+  const std::size_t count = numbers.total() * static_cast<std::size_t>(numbers.channels());
+  undo_misalignment({numbers.ptr<float>(), count}, numbers.cols, numbers.channels(), pose.misalignment,
+                    {aligned_numbers.ptr<float>(), count});
+  aligned_numbers.convertTo(aligned, CV_8U);
+  mapper.compute(aligned, map);
+  make_query_windows(map, model.space, model.scale, model.voting, aligned_windows);
+  rematcher.match(aligned_windows, {&object, 1});
+  rematcher.plain_votes(aligned_windows, object, aligned_votes);
+  return votes_near(aligned_votes, model.objects[object], model.poses[object], pose.q) /
+         aligned_windows.total_weight;
+}
+
+double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
+  matcher.window_likeness(object, candidate, likeness, background);
+  const auto foreign =
+      std::count_if(likeness.begin(), likeness.end(), [](float k) { return k < foreign_likeness; });
+  return static_cast<double>(foreign) / static_cast<double>(likeness.size());
+}
+
+double PartsRecognizer::Impl::covered_share(std::size_t object, const std::vector<float>& plain) {
+  const PartsObject& parts = model.objects[object];
+  int best = 0;
+  for (std::size_t c = 0; c < plain.size(); ++c) {
+    if (!parts.candidates[c].mirrored && plain[c] > plain[static_cast<std::size_t>(best)]) {
+      best = static_cast<int>(c);
+    }
+  }
+  return foreign_share(object, best);
+}
+
+std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
+  // Every window lends its trust to the cells it covers; a pixel has the mean of its cell's windows.
+  constexpr int cells = CellMap::cells;
+  std::array<float, cells * cells> sum{};
+  std::array<float, cells * cells> count{};
+  for (std::size_t w = 0; w < likeness.size(); ++w) {
+    const float trust =
+        std::clamp((likeness[w] - foreign_likeness) / (familiar_likeness - foreign_likeness), 0.0F, 1.0F);
+    const int row = static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride - CellMap::pad;
+    const int column = static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride - CellMap::pad;
+    for (int r = std::max(row, 0); r < std::min(row + WindowGrid::window, cells); ++r) {
+      for (int c = std::max(column, 0); c < std::min(column + WindowGrid::window, cells); ++c) {
+        sum[static_cast<std::size_t>(r * cells + c)] += trust;
+        count[static_cast<std::size_t>(r * cells + c)] += 1.0F;
+      }
+    }
+  }
+  constexpr int side = 32;
+  std::vector<float> weights(static_cast<std::size_t>(side) * side);
+  for (int r = 0; r < side; ++r) {
+    for (int c = 0; c < side; ++c) {
+      const auto cell = static_cast<std::size_t>(r * cells / side * cells + c * cells / side);
+      const float mean = sum[cell] / std::max(count[cell], 1.0F);
+      weights[static_cast<std::size_t>(r * side + c)] = mean * mean;
+    }
+  }
+  return weights;
+}
+
+PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<float>& plain,
+                                              double covered) {
+  PartsAnswer answer;
+  answer.object = object;
+  answer.covered = covered;
+  const PartsObject& parts = model.objects[object];
+  const PoseSpace& space = model.poses[object];
+  const auto merit = [&](const PartsPose& pose) {
+    return window_count * pose.votes - 0.5 * pose.cost / model.noise;
+  };
+  for (const AlignedPose& found : aligner.align(posed(), space)) {
+    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+                   0.0};
+    pose.votes = votes_near(plain, parts, space, pose.q) / windows.total_weight;
+    pose.merit = merit(pose);
+    answer.poses.push_back(pose);
+  }
+  const auto better = [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; };
+  sort_few(answer.poses, better);
+  const double best = answer.poses.front().merit;
+  for (std::size_t i = 0; i < std::min(answer.poses.size(), most_revoted); ++i) {
+    PartsPose& pose = answer.poses[i];
+    if (pose.merit < best - close_merit) {
+      break;
+    }
+    const double share = share_after_alignment(object, pose);
+    answer.score = std::min(answer.score, 1.0 - share);
+    pose.votes = 0.5 * (pose.votes + share);
+    pose.merit = merit(pose);
+  }
+  sort_few(answer.poses, better);
+  return answer;
+}
+
+PoseNumbers PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
+                                              int candidate) const {
+  const PartsObject& parts = model.objects[object];
+  const auto axes = model.poses[object].coarse_manifold().axes();
+  PoseNumbers q;
+  q.resize(axes.size());
+  std::size_t rest = static_cast<std::size_t>(parts.candidates[static_cast<std::size_t>(candidate)].view);
+  for (std::size_t a = axes.size(); a-- > 0;) {
+    q[a] = axes[a].samples[rest % axes[a].samples.size()];
+    rest /= axes[a].samples.size();
+  }
+  const auto& near = parts.neighbours[static_cast<std::size_t>(candidate)];
+  if (axes.size() == 1 && near[0] >= 0 && near[1] >= 0) {
+    const double after = plain[static_cast<std::size_t>(near[0])];
+    const double before = plain[static_cast<std::size_t>(near[1])];
+    const double curvature = after - 2.0 * plain[static_cast<std::size_t>(candidate)] + before;
+    if (curvature < 0.0) {
+      const double step = axes[0].dof.period() / static_cast<double>(axes[0].samples.size());
+      q[0] = axes[0].dof.canonical(q[0] + step * std::clamp(0.5 * (before - after) / curvature, -1.0, 1.0));
+    }
+  }
+  return q;
+}
+
+CoveredAnswer PartsRecognizer::Impl::approach_covered(std::size_t object, const std::vector<float>& plain,
+                                                      double covered) {
+  const PartsObject& parts = model.objects[object];
+  CoveredAnswer found;
+  found.answer.object = object;
+  found.answer.covered = covered;
+  // Views with more votes than their neighbours, most votes first.
+  std::vector<int> peaks;
+  for (std::size_t c = 0; c < plain.size(); ++c) {
+    const auto& near = parts.neighbours[c];
+    if (!parts.candidates[c].mirrored &&
+        (near[0] < 0 || plain[c] >= plain[static_cast<std::size_t>(near[0])]) &&
+        (near[1] < 0 || plain[c] >= plain[static_cast<std::size_t>(near[1])])) {
+      peaks.push_back(static_cast<int>(c));
+    }
+  }
+  std::sort(peaks.begin(), peaks.end(), [&](int a, int b) {
+    return plain[static_cast<std::size_t>(a)] > plain[static_cast<std::size_t>(b)];
+  });
+  peaks.resize(std::min(peaks.size(), most_covered_starts));
+  // What the best view trusts is what all poses are compared on.
+  foreign_share(object, peaks.front());
+  found.trust = pixel_trust();
+  masked_aligner.look(posed(), model.poses[object], found.trust);
+  found.starts.reserve(peaks.size());
+  for (const int peak : peaks) {
+    CoveredStart start{masked_aligner.approach(voted_pose(object, plain, peak), masked_reach),
+                       plain[static_cast<std::size_t>(peak)] / windows.total_weight, 0.0};
+    start.merit =
+        vote_merit * start.votes - visible_merit * std::log(std::max(start.pose.aligned.cost, model.noise));
+    found.starts.push_back(start);
+  }
+  std::ranges::stable_sort(found.starts, std::greater<>(), &CoveredStart::merit);
+  return found;
+}
+
+void PartsRecognizer::Impl::refine_covered(CoveredAnswer& found, double hopeless) {
+  PartsAnswer& answer = found.answer;
+  masked_aligner.look(posed(), model.poses[answer.object], found.trust);
+  for (CoveredStart& start : found.starts) {
+    const bool followed = start.merit >= hopeless && answer.poses.size() < most_covered_poses;
+    if (!followed) break;
+    masked_aligner.refine(start.pose, masked_reach);
+    const AlignedPose& pose = start.pose.aligned;
+    const double merit = vote_merit * start.votes -
+                         visible_merit * std::log(std::max(pose.cost, model.noise)) -
+                         unexplained_merit * start.pose.unexplained;
+    answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit});
+  }
+  sort_few(answer.poses, [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
+  if (!answer.poses.empty()) answer.score = 1.0 - answer.poses.front().votes;
+}
+
+PartsRecognizer::PartsRecognizer(const PartsModel& model) : impl_(std::make_unique<Impl>(model)) {}
+PartsRecognizer::~PartsRecognizer() = default;
+PartsRecognizer::PartsRecognizer(PartsRecognizer&&) noexcept = default;
+PartsRecognizer& PartsRecognizer::operator=(PartsRecognizer&&) noexcept = default;
+
+void PartsRecognizer::look(const cv::Mat& picture) {
+  if (picture.rows == CellMap::pixels) {
+    picture.copyTo(impl_->picture);
+  } else {
+    cv::resize(picture, impl_->picture, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
+  }
+  impl_->windows_made = false;
+  impl_->numbers_made = false;
+  impl_->pose_picture_made = false;
+}
+
+const PosePicture& PartsRecognizer::pose_picture() {
+  return impl_->posed();
+}
+
+std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> shortlist) {
+  if (!impl_->windows_made) {
+    impl_->mapper.compute(impl_->picture, impl_->map);
+    make_query_windows(impl_->map, impl_->model.space, impl_->model.scale, impl_->model.voting,
+                       impl_->windows);
+    impl_->windows_made = true;
+  }
+  return impl_->matcher.match(
+      impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
+}
+
+double PartsRecognizer::share_of(std::size_t object) const {
+  const std::vector<float>& plain = impl_->votes_of(object);
+  return static_cast<double>(*std::ranges::max_element(plain) / impl_->windows.total_weight);
+}
+
+PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
+  Impl& impl = *impl_;
+  const std::vector<float>& plain = impl.votes_of(object);
+  const double share = impl.covered_share(object, plain);
+  if (!covered && share <= impl.model.calibration[object].covered_share)
+    return impl.find_poses(object, plain, share);
+  CoveredAnswer found = impl.approach_covered(object, plain, share);
+  impl.refine_covered(found, found.starts.front().merit - hopeless_merit);
+  return found.answer;
+}
+
+void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes, PartsIdentification& found) {
+  std::vector<CoveredAnswer> rivals;
+  const auto approach = [&](const PartialVote& vote) {
+    const std::vector<float>& plain = votes_of(vote.object);
+    rivals.push_back(approach_covered(vote.object, plain, covered_share(vote.object, plain)));
+  };
+  for (std::size_t i = 0; i < std::min(most_rivals, votes.size()); ++i) {
+    if (votes[i].score < rival_votes * votes[0].score) break;
+    approach(votes[i]);
+  }
+  double most = -std::numeric_limits<double>::infinity();
+  for (const CoveredAnswer& rival : rivals) most = std::max(most, rival.starts.front().merit);
+  double best = -std::numeric_limits<double>::infinity();
+  for (CoveredAnswer& rival : rivals) {
+    refine_covered(rival, most - hopeless_merit);
+    if (!rival.answer.poses.empty()) best = std::max(best, rival.answer.poses.front().merit);
+  }
+  // A second object is told in any case, as near as it was come to.
+  const std::size_t contenders = rivals.size();
+  if (rivals.size() == 1 && votes.size() > 1 && votes[1].score > 0.0F) approach(votes[1]);
+  for (CoveredAnswer& rival : rivals) {
+    if (!rival.answer.poses.empty()) continue;
+    const CoveredStart& start = rival.starts.front();
+    const AlignedPose& pose = start.pose.aligned;
+    rival.answer.score = 1.0 - start.votes;
+    rival.answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes,
+                                  best - std::max(most - start.merit, hopeless_merit)});
+  }
+  const auto ranked = std::span(rivals).first(contenders);
+  std::ranges::stable_sort(ranked, std::greater<>(),
+                           [](const CoveredAnswer& rival) { return rival.answer.poses.front().merit; });
+  found.best = rivals[0].answer;
+  if (rivals.size() > 1) found.second = rivals[1].answer;
+}
+
+PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist, bool covered) {
+  Impl& impl = *impl_;
+  const auto votes = vote(shortlist);
+  const std::size_t first = votes[0].object;
+  const std::vector<float>& plain = impl.votes_of(first);
+  const double share = impl.covered_share(first, plain);
+  covered = covered || share > impl.model.calibration[first].covered_share;
+  PartsIdentification found;
+  if (covered) {
+    impl.identify_covered(votes, found);
+  } else {
+    found.best = impl.find_poses(first, plain, share);
+    if (votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);
+  }
+  const auto votes_for = [&](const PartsAnswer& answer) {
+    return static_cast<double>(std::ranges::find(votes, answer.object, &PartialVote::object)->score);
+  };
+  const double own = std::max(votes_for(found.best), 1e-9);
+  if (found.second) found.second_share = votes_for(*found.second) / own;
+  if (covered) {
+    const PartsPose& pose = found.best.poses.front();
+    found.tie = found.second && found.second->poses.front().merit > pose.merit - tied_merit;
+    found.evidence =
+        vote_evidence * own / (impl.windows.total_weight * std::max(1.0 - found.best.covered, 0.1)) -
+        std::log(std::max(pose.cost, impl.model.noise)) - found.second_share;
+  } else {
+    found.tie = found.second_share > tied_votes;
+  }
+  return found;
+}
+
+}  // namespace eigenpose

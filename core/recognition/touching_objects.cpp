@@ -1,0 +1,356 @@
+#include "core/recognition/touching_objects.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/image/foreground.h"
+#include "core/image/region.h"
+
+namespace eigenpose {
+namespace {
+
+/// Learned sizes that differ by less than this share of the larger side are tried as one.
+constexpr double same_extent = 0.12;
+constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are told apart less finely
+/// An object may reach beyond what is seen of it by this share of its side: so much may be covered.
+constexpr double most_beyond = 0.45;
+/// A box of another size than the object's costs it votes: so many of those its own views get, or more.
+constexpr double least_trial_votes = 0.7;
+constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
+constexpr double place_step = 0.25;     ///< between boxes away from the corners, in their sides
+constexpr double least_filled = 0.6;    ///< of a box away from the corners: foreground
+constexpr double same_place = 0.7;      ///< of two boxes' union
+constexpr int most_looks = 3000;        ///< at boxes; then it stays with what was found
+constexpr std::size_t most_first = 3;   ///< of them, those that are followed to the end
+constexpr std::size_t most_objects = 6;
+/// A remaining piece of this share of the smallest learned box, or more, may be an object; less is outline.
+constexpr double least_piece = 0.2;
+constexpr double least_explained = 0.85;
+constexpr double plainly_explained = 0.97;  ///< no other first object is tried
+/// What others leave in an object's picture costs evidence while they are being found, and some of it even
+/// with them taken out.
+constexpr double search_slack = 3.0;
+constexpr double most_overlapped = 0.25;  ///< of an object, in the end; strangers leave more unexplained
+constexpr double most_left_over = 0.1;    ///< what is covered by more than this gets no slack in the end
+constexpr double final_slack = 1.5;
+constexpr double beyond_doubt = 1.5;  ///< evidence more than is asked for
+/// A known object that is so much larger than it was learned may be two.
+constexpr double doubtful_size = 1.3;
+constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
+
+/// Whether enough of a box is foreground for an object. @param sums integral of a foreground.
+bool filled(const cv::Rect& box, const cv::Mat& sums) {
+  const cv::Rect inside = box & cv::Rect(0, 0, sums.cols - 1, sums.rows - 1);
+  const auto at = [&](int x, int y) { return sums.at<int>(y, x); };
+  const int sum = at(inside.br().x, inside.br().y) - at(inside.x, inside.br().y) -
+                  at(inside.br().x, inside.y) + at(inside.x, inside.y);
+  return sum >= 255.0 * least_filled * box.area();
+}
+
+/// The learned view nearest to a pose, in the order of the grid.
+std::size_t nearest_view(const PoseSpace& space, std::span<const double> q) {
+  const auto axes = space.coarse_manifold().axes();
+  std::size_t view = 0;
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    const auto away = [&](double sample) { return std::abs(axes[a].dof.difference(q[a], sample)); };
+    const auto nearest = std::ranges::min_element(axes[a].samples, {}, away);
+    view = view * axes[a].samples.size() + static_cast<std::size_t>(nearest - axes[a].samples.begin());
+  }
+  return view;
+}
+
+/// What a mask is made of.
+struct Piece {
+  cv::Rect box;     ///< of the largest piece
+  double area = 0;  ///< its pixels
+  double all = 0;   ///< those of all pieces
+};
+
+Piece largest_piece(const cv::Mat& mask) {
+  cv::Mat labels;
+  cv::Mat stats;
+  cv::Mat centres;
+  const int count = cv::connectedComponentsWithStats(mask, labels, stats, centres);
+  Piece largest;
+  for (int i = 1; i < count; ++i) {
+    const int area = stats.at<int>(i, cv::CC_STAT_AREA);
+    largest.all += area;
+    if (area <= largest.area) continue;
+    largest.area = area;
+    largest.box = {stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
+                   stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT)};
+  }
+  return largest;
+}
+
+/// Of those that are the same object in about the same place, the first.
+void keep_different(std::vector<FusedObject>& objects) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const auto again = [&](const FusedObject& other) {
+      return other.found.best.object == objects[i].found.best.object &&
+             shared_area(other.box, objects[i].box) > same_place;
+    };
+    objects.erase(std::remove_if(objects.begin() + static_cast<std::ptrdiff_t>(i) + 1, objects.end(), again),
+                  objects.end());
+  }
+}
+
+}  // namespace
+
+FusedRegion::FusedRegion(const NormalizationOptions& normalization, const PartsModel& parts,
+                         PartsRecognizer& recognizer)
+    : normalization_(normalization),
+      parts_(parts),
+      recognizer_(recognizer),
+      normalizer_(normalization),
+      least_(std::numeric_limits<int>::max(), std::numeric_limits<int>::max()),
+      picture_(normalization.size, normalization.size,
+               picture_bands(normalization) == 3 ? CV_8UC3 : CV_8UC1) {
+  for (double same = same_extent; extents_.empty() || extents_.size() > most_extents; same *= 1.3) {
+    extents_.clear();
+    group_extents(same);
+    if (extents_.empty()) break;
+  }
+}
+
+void FusedRegion::group_extents(double same) {
+  for (std::size_t o = 0; o < parts_.extents.size(); ++o) {
+    for (const cv::Size& size : parts_.extents[o]) {
+      if (size.empty()) continue;  // of an object that came ready-cut
+      least_ = {std::min(least_.width, size.width), std::min(least_.height, size.height)};
+      const double side = std::max(size.width, size.height);
+      const auto like = std::ranges::find_if(extents_, [&](const Extent& known) {
+        return std::abs(known.size.width - size.width) < same * side &&
+               std::abs(known.size.height - size.height) < same * side;
+      });
+      Extent& extent = like != extents_.end() ? *like : extents_.emplace_back(Extent{size, {}});
+      if (extent.objects.empty() || extent.objects.back() != o) extent.objects.push_back(o);
+    }
+  }
+}
+
+bool FusedRegion::possible(const cv::Size& region) const {
+  return !extents_.empty() && region.width >= least_.width && region.height >= least_.height &&
+         (region.width >= 1.2 * least_.width || region.height >= 1.2 * least_.height);
+}
+
+bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
+  crop_.create(box.size(), work_.type());
+  crop_.setTo(background_.color());
+  const cv::Rect inside = box & cv::Rect(0, 0, work_.cols, work_.rows);
+  if (inside.empty() || looks_left_ == 0) return false;
+  --looks_left_;
+  work_(inside).copyTo(crop_(inside - box.tl()));
+  picture.resize(picture_length(normalization_));
+  if (!(normalizer_.normalize(crop_, background_.level, picture) > 0.0F)) return false;
+  quantize(picture, {picture_.ptr<std::uint8_t>(), picture_.total() * picture_.elemSize()});
+  recognizer_.look(picture_);
+  return true;
+}
+
+cv::Size FusedRegion::learned_size(std::size_t object, std::span<const double> q) const {
+  return parts_.extents[object][nearest_view(parts_.poses[object], q)];
+}
+
+bool FusedRegion::too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const {
+  if (extents_.empty()) return false;
+  const cv::Size learned = learned_size(object, q);
+  return !learned.empty() &&
+         (region.width > doubtful_size * learned.width || region.height > doubtful_size * learned.height);
+}
+
+std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline, double visible, Places places) {
+  std::vector<Trial> all;
+  std::vector<float> picture;
+  cv::Mat sums;
+  if (places == Places::all) cv::integral(foreground_of(work_, background_), sums, CV_32S);
+  for (std::size_t e = 0; e < extents_.size(); ++e) {
+    const cv::Size& size = extents_[e].size;
+    if ((1.0 - most_beyond) * size.width > outline.width ||
+        (1.0 - most_beyond) * size.height > outline.height)
+      continue;
+    const cv::Size room(outline.width - size.width, outline.height - size.height);
+    const auto steps = [&](int free, int side) {
+      return places == Places::corners ? 1
+                                       : std::max(1, static_cast<int>(std::ceil(free / (place_step * side))));
+    };
+    const int across = steps(room.width, size.width);
+    const int down = steps(room.height, size.height);
+    for (int i = 0; i <= across; ++i) {
+      for (int k = 0; k <= down; ++k) {
+        const cv::Rect box({outline.x + room.width * i / across, outline.y + room.height * k / down}, size);
+        const bool corner = (i == 0 || i == across) && (k == 0 || k == down);
+        if (places == Places::all && (corner || !filled(box, sums))) continue;  // corners have been looked at
+        if (!look(box, picture)) continue;
+        const auto votes = recognizer_.vote(extents_[e].objects);
+        const std::size_t object = votes[0].object;
+        const double share = recognizer_.share_of(object);
+        const double own = 1.0 - parts_.calibration[object].rejection_score;
+        if (share >= least_trial_votes * visible * own) all.push_back({box, e, share});
+      }
+    }
+  }
+  const auto kept = std::min(all.size(), most_trials);
+  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(kept), all.end(),
+                    [](const Trial& a, const Trial& b) { return a.votes > b.votes; });
+  all.resize(kept);
+  return all;
+}
+
+FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
+  FusedObject object{box, {}, {}};
+  if (!look(box, object.picture)) return object;
+  object.found = recognizer_.identify(shortlist, true);
+  const PartsPose& pose = object.found.best.poses.front();
+  // The size of the learned view, about the middle that alignment found.
+  const cv::Size learned = learned_size(object.found.best.object, pose.q);
+  const cv::Size size = learned.empty() ? box.size() : learned;
+  const double side = std::max(box.width, box.height);
+  const double x = box.x + 0.5 * box.width + side * pose.misalignment.dx;
+  const double y = box.y + 0.5 * box.height + side * pose.misalignment.dy;
+  object.box = {cv::Point(static_cast<int>(std::lround(x - 0.5 * size.width)),
+                          static_cast<int>(std::lround(y - 0.5 * size.height))),
+                size};
+  return object;
+}
+
+std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double visible) {
+  for (const Places places : {Places::corners, Places::all}) {
+    std::vector<FusedObject> found = candidates(trials(outline, visible, places));
+    if (!found.empty()) return found;
+  }
+  return {};
+}
+
+std::vector<FusedObject> FusedRegion::candidates(std::span<const Trial> trials) {
+  std::vector<FusedObject> found;
+  for (const Trial& trial : trials) {
+    FusedObject object = settle(trial.box, extents_[trial.extent].objects);
+    if (!object.found.best.poses.empty()) found.push_back(std::move(object));
+  }
+  const auto by_evidence = [](const FusedObject& a, const FusedObject& b) {
+    return a.found.evidence > b.found.evidence;
+  };
+  std::ranges::sort(found, by_evidence);
+  keep_different(found);
+  found.resize(std::min(found.size(), most_first));
+  // Again in the box that alignment set right, where there is less to be aligned.
+  for (FusedObject& object : found) {
+    FusedObject again = settle(object.box, {});
+    if (!again.found.best.poses.empty() && again.found.evidence > object.found.evidence)
+      object = std::move(again);
+  }
+  std::erase_if(found, [&](const FusedObject& object) {
+    return !(object.found.evidence > parts_.covered_evidence - search_slack);
+  });
+  std::ranges::sort(found, by_evidence);
+  keep_different(found);
+  return found;
+}
+
+cv::Mat FusedRegion::silhouette(const FusedObject& object) const {
+  const PoseSpace& space = parts_.poses[object.found.best.object];
+  const int side = space.coarse().side;
+  Eigen::VectorXf pixels;
+  space.render(object.found.best.poses.front().q, pixels);
+  const auto level = static_cast<float>(silhouette_level / side);
+  const cv::Mat picture(side, side, CV_32F, pixels.data());
+  const int square = std::max(object.box.width, object.box.height);
+  cv::Mat scaled;
+  cv::resize(picture, scaled, {square, square}, 0.0, 0.0, cv::INTER_LINEAR);
+  const cv::Mat mask = scaled > level;
+  cv::Mat out = cv::Mat::zeros(work_.size(), CV_8U);
+  const cv::Rect place(object.box.x + object.box.width / 2 - square / 2,
+                       object.box.y + object.box.height / 2 - square / 2, square, square);
+  const cv::Rect inside = place & object.box & cv::Rect(0, 0, work_.cols, work_.rows);
+  if (!inside.empty()) mask(inside - place.tl()).copyTo(out(inside));
+  return out;
+}
+
+double FusedRegion::complete(FusedObject first, const cv::Mat& foreground, TakenApart& way) {
+  const double whole = cv::countNonZero(foreground);
+  cv::Mat left = foreground.clone();
+  way.objects.clear();
+  way.objects.push_back(std::move(first));
+  while (true) {
+    const cv::Mat taken = silhouette(way.objects.back());
+    left.setTo(0, taken);
+    work_.setTo(background_.color(), taken);
+    cv::Mat pieces;
+    cv::morphologyEx(left, pieces, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+    const Piece piece = largest_piece(pieces);
+    const double explained = 1.0 - piece.all / whole;
+    way.unknown.clear();
+    if (piece.area < least_piece * least_.area()) return explained;
+    way.unknown.push_back(piece.box);
+    if (way.objects.size() == most_objects) return explained;
+    std::vector<FusedObject> next = candidates(piece.box, 1.0 - most_overlapped);
+    if (next.empty()) return explained;
+    way.objects.push_back(std::move(next.front()));
+  }
+}
+
+const TakenApart& FusedRegion::take_apart(const cv::Mat& cut, const Background& background) {
+  background_ = background;
+  looks_left_ = most_looks;
+  result_ = {};
+  if (!possible(cut.size())) return result_;
+  std::vector<FusedObject>& objects = result_.objects;
+  cut.copyTo(work_);
+  const cv::Mat foreground = foreground_of(cut, background);
+  const cv::Rect outline = largest_piece(foreground).box;
+  if (outline.empty()) return result_;
+  // Of objects that overlap, one stands before the others and shows itself whole.
+  const std::vector<FusedObject> first = candidates(outline, 1.0);
+  double most = 0.0;
+  TakenApart way;
+  for (const FusedObject& begun : first) {
+    cut.copyTo(work_);
+    const double explained = complete(begun, foreground, way);
+    if (explained > most) {
+      most = explained;
+      result_ = way;
+    }
+    if (most > plainly_explained) break;
+  }
+  // Each once more, without the others in its picture.
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    cut.copyTo(work_);
+    const cv::Mat own = silhouette(objects[i]);
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      if (k == i) continue;
+      cv::Mat other = silhouette(objects[k]);
+      other.setTo(0, own);
+      work_.setTo(background_.color(), other);
+    }
+    FusedObject again = settle(objects[i].box, std::span(&objects[i].found.best.object, 1));
+    if (again.found.best.poses.empty()) continue;
+    again.found.second = objects[i].found.second;
+    again.found.second_share = objects[i].found.second_share;
+    again.found.tie = objects[i].found.tie;
+    objects[i] = std::move(again);
+  }
+  const auto sure = [&](const FusedObject& object, double slack) {
+    return object.found.best.covered <= most_overlapped &&
+           object.found.evidence > parts_.covered_evidence - slack;
+  };
+  const bool all = objects.size() > 1 && most > least_explained &&
+                   std::ranges::all_of(objects, [&](const FusedObject& object) {
+                     return sure(object, object.found.best.covered <= most_left_over ? final_slack : 0.0);
+                   });
+  if (all) return result_;
+  // What is beyond doubt is told even beside something that is not known.
+  std::erase_if(objects, [&](const FusedObject& object) {
+    if (sure(object, -beyond_doubt)) return false;
+    result_.unknown.push_back(object.box);
+    return true;
+  });
+  if (objects.empty() || result_.unknown.empty()) result_ = {};
+  return result_;
+}
+
+}  // namespace eigenpose

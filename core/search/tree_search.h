@@ -1,0 +1,68 @@
+#pragma once
+
+/// Exact global closest point on the continuous manifolds: one wide tree of boxes over all segments and
+/// patches.
+///
+/// A box holds its patch by the convex-hull property of Bernstein polynomials, rounded outward to float. A
+/// node is 16 boxes, compared with the point at once. The search goes depth first, nearest box first, and
+/// leaves out what cannot come within the best distance so far (or the caller's bound), less a slack for
+/// float rounding.
+///
+/// Guarantee: no point of any manifold is nearer than the answer by more than rounding (m = 1) or
+/// `patch_distance_tolerance` (m ≥ 2). The slack makes leaving out safe: a sum of K squares in float is wrong
+/// by less than (K+3)·2⁻²⁴ of itself, and a box is left out only where its float distance exceeds the best by
+/// (4K+32)·2⁻²⁴.
+
+#include "core/search/patch_set.h"
+#include "core/search/search.h"
+#include "core/simd/box_kernel.h"
+
+namespace eigenpose {
+
+/// What a tree search has proven.
+struct SearchCertificate {
+  /// Every point of every manifold outside the answer lies at least this far away, and so does every point of
+  /// the manifolds in it that is nearer than their answer. Equal to the last answer's distance up to the
+  /// slack, or to the bound if fewer manifolds than asked for were found.
+  double lower_bound = 0.0;
+  std::size_t nodes = 0;    ///< compared with the point, 16 boxes each
+  std::size_t patches = 0;  ///< solved
+};
+
+/// The default search. Memory: 2·K floats per patch for the boxes, and the scalars of PatchSet.
+class TreeSearch final : public ManifoldSearch {
+ public:
+  explicit TreeSearch(std::span<const Manifold> manifolds) : TreeSearch(manifolds, nullptr) {}
+  /// @param kernel one of box_kernels(), or nullptr for the fastest.
+  TreeSearch(std::span<const Manifold> manifolds, BoxKernel kernel);
+
+  [[nodiscard]] std::size_t nearest_into(
+      const Eigen::Ref<const Eigen::VectorXf>& point, std::span<ClosestPoint> results,
+      double bound = std::numeric_limits<double>::infinity()) const override;
+  /// The same, with its proof.
+  [[nodiscard]] std::size_t nearest_certified(const Eigen::Ref<const Eigen::VectorXf>& point,
+                                              std::span<ClosestPoint> results, double bound,
+                                              SearchCertificate& certificate) const;
+
+  [[nodiscard]] std::string_view name() const override { return "tree"; }
+  [[nodiscard]] std::size_t memory() const override;
+
+ private:
+  struct Node {
+    std::uint32_t first = 0;  ///< number of the first child node, or of the first entry of `order_`
+    std::uint32_t count = 0;  ///< children in use, at most box_lanes
+  };
+  template <bool Certify>
+  void run(const float* point, const double* exact, class BestList& best,
+           SearchCertificate* certificate) const;
+  void build(std::span<const float> boxes);
+
+  PatchSet patches_;
+  BoxKernel kernel_;
+  std::size_t first_leaf_ = 0;        ///< nodes from here on have patches as children
+  std::vector<Node> nodes_;           ///< level by level, the root first
+  std::vector<BoxSlice> slices_;      ///< K per node
+  std::vector<std::uint32_t> order_;  ///< patches as the lowest nodes hold them
+};
+
+}  // namespace eigenpose

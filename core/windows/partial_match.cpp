@@ -1,0 +1,187 @@
+#include "core/windows/partial_match.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace eigenpose {
+namespace {
+
+/// exp(−x) for x ≥ 0 from a table: relative error below 1 %, 0 beyond 16.
+float fast_exp_of_minus(float x) {
+  constexpr int per_unit = 64;
+  constexpr int size = 16 * per_unit;
+  static const std::array<float, size> table = [] {
+    std::array<float, size> made{};
+    for (int i = 0; i < size; ++i) {
+      made[static_cast<std::size_t>(i)] = std::exp(-(static_cast<float>(i) + 0.5F) / per_unit);
+    }
+    return made;
+  }();
+  const int i = static_cast<int>(x * per_unit);
+  return i < 0 ? 1.0F : i < size ? table[static_cast<std::size_t>(i)] : 0.0F;
+}
+
+/// Of numbers whose count is a multiple of eight.
+std::int32_t largest(const std::int32_t* numbers, std::size_t count) {
+  std::array<std::int32_t, WindowStore::group> most{};
+  std::copy_n(numbers, most.size(), most.begin());
+  for (std::size_t i = most.size(); i < count; i += most.size()) {
+    for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::max(most[k], numbers[i + k]);
+  }
+  return *std::ranges::max_element(most);
+}
+
+}  // namespace
+
+void make_query_windows(const CellMap& map, const WindowSpace& space, const WindowScale& scale,
+                        const VotingOptions& options, QueryWindows& out) {
+  thread_local Eigen::MatrixXf coordinates;
+  space.project(map, QueryWindows::stride, coordinates, &out.weights);
+  out.windows.resize(static_cast<std::size_t>(coordinates.cols()));
+  out.total_weight = 0.0F;
+  for (Eigen::Index i = 0; i < coordinates.cols(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    out.windows[at] = quantize_query(coordinates.col(i).data(), scale);
+    out.weights[at] = out.weights[at] / space.mean_mass() + options.floor_weight;
+    out.total_weight += out.weights[at];
+  }
+}
+
+PartialMatcher::PartialMatcher(std::span<const PartsObject> objects, const WindowScale& scale,
+                               VotingOptions options)
+    : objects_(objects), scale_(scale), options_(options) {
+  one_lane_each_.reserve(objects.size());
+  for (const PartsObject& object : objects) {
+    bool each = object.lane_candidate.size() == object.candidates.size();
+    for (std::size_t lane = 0; lane < object.lane_candidate.size() && each; ++lane)
+      each = object.lane_candidate[lane] == lane;
+    one_lane_each_.push_back(each);
+  }
+}
+
+float PartialMatcher::likeness(float energy, std::int32_t score) const {
+  const float squared = energy - 2.0F * scale_.product() * static_cast<float>(score);
+  return fast_exp_of_minus(std::max(squared, 0.0F) / (2.0F * options_.width * options_.width));
+}
+
+std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
+                                                   std::span<const std::size_t> shortlist) {
+  query_ = &query;
+  constexpr std::size_t absent = std::numeric_limits<std::size_t>::max();
+  offsets_.assign(objects_.size(), absent);
+  row_length_ = 0;
+  std::size_t most_lanes = 0;
+  for (const std::size_t o : shortlist) {
+    offsets_[o] = row_length_;
+    row_length_ += objects_[o].candidates.size();
+    most_lanes = std::max(most_lanes, objects_[o].store.groups() * WindowStore::group);
+  }
+  const std::size_t count = query.windows.size();
+  scores_.resize(count * row_length_);
+  lanes_.resize(count * most_lanes);
+  placed_.place(query.windows, QueryWindows::stride, options_.tolerance, scale_);
+  bests_.resize(count * shortlist.size());
+  for (std::size_t i = 0; i < shortlist.size(); ++i) {
+    const std::size_t o = shortlist[i];
+    const PartsObject& object = objects_[o];
+    object.store.best_scores(placed_, lanes_.data());
+    const std::size_t lanes = object.store.groups() * WindowStore::group;
+    const std::size_t candidates = object.candidates.size();
+    for (std::size_t w = 0; w < count; ++w) {
+      const std::int32_t* lane_scores = lanes_.data() + w * lanes;
+      std::int32_t* out = scores_.data() + w * row_length_ + offsets_[o];
+      if (one_lane_each_[o]) {
+        std::copy_n(lane_scores, candidates, out);
+      } else {
+        std::fill_n(out, candidates, std::numeric_limits<std::int32_t>::min());
+        for (std::size_t lane = 0; lane < object.lane_candidate.size(); ++lane) {
+          std::int32_t& best = out[object.lane_candidate[lane]];
+          best = std::max(best, lane_scores[lane]);
+        }
+      }
+      // Places that are no views score far below all others.
+      bests_[w * shortlist.size() + i] = largest(lane_scores, lanes);
+    }
+  }
+
+  votes_.assign(row_length_, 0.0F);
+  background_.assign(count, 0.0F);
+  const auto rank = static_cast<std::size_t>(options_.background_rank);
+  for (std::size_t w = 0; w < count; ++w) {
+    const std::int32_t* row = scores_.data() + w * row_length_;
+    const auto bests = std::span(bests_).subspan(w * shortlist.size(), shortlist.size());
+    std::int32_t floor = std::numeric_limits<std::int32_t>::min();
+    if (shortlist.size() > rank) {
+      sorted_.assign(bests.begin(), bests.end());
+      std::nth_element(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(rank - 1),
+                       sorted_.end(), std::greater<>());
+      floor = sorted_[rank - 1];
+      background_[w] = likeness(query.windows[w].energy, floor);
+    }
+    for (std::size_t i = 0; i < shortlist.size(); ++i) {
+      if (bests[i] <= floor) {
+        continue;
+      }
+      const PartsObject& object = objects_[shortlist[i]];
+      const std::int32_t* scores = row + offsets_[shortlist[i]];
+      float* votes = votes_.data() + offsets_[shortlist[i]];
+      const std::size_t candidates = object.candidates.size();
+      kappas_.resize(candidates);
+      for (std::size_t c = 0; c < candidates; ++c) {
+        kappas_[c] = likeness(query.windows[w].energy, scores[c]);
+      }
+      for (std::size_t c = 0; c < candidates; ++c) {
+        float kappa = kappas_[c];
+        for (const int n : object.neighbours[c]) {
+          if (n >= 0) {
+            kappa = std::max(kappa, options_.pooling * kappas_[static_cast<std::size_t>(n)]);
+          }
+        }
+        votes[c] += query.weights[w] * std::max(0.0F, kappa - background_[w]);
+      }
+    }
+  }
+
+  result_.clear();
+  for (const std::size_t o : shortlist) {
+    const float* votes = votes_.data() + offsets_[o];
+    const float* best = std::max_element(votes, votes + objects_[o].candidates.size());
+    result_.push_back({o, *best, static_cast<int>(best - votes)});
+  }
+  std::sort(result_.begin(), result_.end(), [](const PartialVote& a, const PartialVote& b) {
+    return a.score != b.score ? a.score > b.score : a.object < b.object;
+  });
+  return result_;
+}
+
+void PartialMatcher::plain_votes(const QueryWindows& query, std::size_t object,
+                                 std::vector<float>& votes) const {
+  votes.assign(objects_[object].candidates.size(), 0.0F);
+  for (std::size_t w = 0; w < query.windows.size(); ++w) {
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
+    for (std::size_t c = 0; c < votes.size(); ++c) {
+      votes[c] += query.weights[w] * likeness(query.windows[w].energy, scores[c]);
+    }
+  }
+}
+
+void PartialMatcher::window_likeness(std::size_t object, int candidate, std::vector<float>& likeness_of,
+                                     std::vector<float>& background) const {
+  const std::size_t count = query_->windows.size();
+  likeness_of.resize(count);
+  background = background_;
+  for (std::size_t w = 0; w < count; ++w) {
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
+    float kappa = likeness(query_->windows[w].energy, scores[candidate]);
+    for (const int n : objects_[object].neighbours[static_cast<std::size_t>(candidate)]) {
+      if (n >= 0) {
+        kappa = std::max(kappa, likeness(query_->windows[w].energy, scores[n]));
+      }
+    }
+    likeness_of[w] = kappa;
+  }
+}
+
+}  // namespace eigenpose

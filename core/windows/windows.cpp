@@ -1,0 +1,163 @@
+#include "core/windows/windows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "core/base/linear_algebra.h"
+#include "core/base/parallel.h"
+#include "core/simd/dense_kernels.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr float soft_mass = 0.2F;      // a window with less gradient than this fades out
+constexpr float soft_energy = 0.2F;    // likewise for brightness
+constexpr float chroma_weight = 4.0F;  // colour against brightness
+
+}  // namespace
+
+float window_vector(const CellMap& map, int row, int column, float* out) {
+  constexpr int n = WindowGrid::window;
+  constexpr int cells = n * n;
+  float mass = 0.0F;
+  float* orientation = out;
+  for (int r = 0; r < n; ++r) {
+    const float* source = map.orientation_at(row + r, column);
+    for (int i = 0; i < n * CellMap::bins; ++i) {
+      mass += source[i];
+      orientation[r * n * CellMap::bins + i] = source[i];
+    }
+  }
+  const float scale = 1.0F / (mass + soft_mass);
+  for (int i = 0; i < cells * CellMap::bins; ++i) {
+    orientation[i] = std::sqrt(orientation[i] * scale);
+  }
+
+  const int bands = map.bands;
+  const float per_band = 1.0F / static_cast<float>(bands);
+  float energy = 0.0F;
+  float* level = out + cells * CellMap::bins;
+  float* chroma = level + cells;
+  const float weight = chroma_weight / std::sqrt(static_cast<float>(bands));
+  for (int r = 0; r < n; ++r) {
+    for (int c = 0; c < n; ++c) {
+      const float* source = map.brightness_at(row + r, column + c);
+      float sum = 0.0F;
+      for (int b = 0; b < bands; ++b) {
+        sum += source[b];
+        energy += source[b] * source[b];
+      }
+      const int cell = r * n + c;
+      level[cell] = sum * per_band;
+      if (bands > 1) {
+        for (int b = 0; b < bands; ++b) {
+          chroma[cell * bands + b] = weight * (source[b] - level[cell]);
+        }
+      }
+    }
+  }
+  const float divisor = 1.0F / std::sqrt(energy * per_band + soft_energy * soft_energy);
+  const int rest = window_length(bands) - cells * CellMap::bins;
+  for (int i = 0; i < rest; ++i) {
+    level[i] *= divisor;
+  }
+  return mass;
+}
+
+WindowSpace WindowSpace::learn(const std::vector<CellMap>& maps, unsigned threads, std::size_t limit) {
+  if (maps.empty()) {
+    throw std::invalid_argument("a window eigenspace needs at least one cell map, got none");
+  }
+  const int length = window_length(maps.front().bands);
+  // Two passes over the windows keep memory small: masses first, then the scatter of the chosen ones.
+  std::vector<float> scratch(static_cast<std::size_t>(length));
+  std::vector<float> masses(maps.size() * WindowGrid::positions);
+  parallel_for(maps.size(), threads, [&](std::size_t m) {
+    std::vector<float> vector(static_cast<std::size_t>(length));
+    for (int p = 0; p < WindowGrid::positions; ++p) {
+      masses[m * WindowGrid::positions + static_cast<std::size_t>(p)] =
+          window_vector(maps[m], p / WindowGrid::side, p % WindowGrid::side, vector.data());
+    }
+  });
+  const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
+  std::vector<float> sorted = masses;
+  const auto quantile = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 3 / 10);
+  std::nth_element(sorted.begin(), quantile, sorted.end());
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    if (masses[i] >= *quantile) {
+      chosen.push_back(i);
+    }
+  }
+  const std::size_t count = std::min(limit, chosen.size());
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(length);
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(length, length);
+  constexpr Eigen::Index batch = 256;
+  Eigen::MatrixXd block(length, batch);
+  Eigen::Index filled = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t index = chosen[i * chosen.size() / count];
+    const auto position = static_cast<int>(index % WindowGrid::positions);
+    window_vector(maps[index / WindowGrid::positions], position / WindowGrid::side,
+                  position % WindowGrid::side, scratch.data());
+    block.col(filled++) = Eigen::Map<const Eigen::VectorXf>(scratch.data(), length).cast<double>();
+    if (filled == batch || i + 1 == count) {
+      const auto part = block.leftCols(filled);
+      mean += part.rowwise().sum();
+      scatter.selfadjointView<Eigen::Lower>().rankUpdate(part);
+      filled = 0;
+    }
+  }
+  mean /= static_cast<double>(count);
+  scatter.selfadjointView<Eigen::Lower>().rankUpdate(mean, -static_cast<double>(count));
+  const SymmetricEigen found = symmetric_eigen(scatter);
+  Eigen::MatrixXf basis(length, WindowGrid::components);
+  for (int k = 0; k < WindowGrid::components; ++k) {
+    Eigen::VectorXd vector = found.vectors.col(k);
+    Eigen::Index largest = 0;
+    vector.cwiseAbs().maxCoeff(&largest);
+    basis.col(k) = (vector(largest) < 0.0 ? -vector : vector).cast<float>();
+  }
+  return from_parts(mean.cast<float>(), std::move(basis),
+                    static_cast<float>(sum / static_cast<double>(masses.size())));
+}
+
+WindowSpace WindowSpace::from_parts(Eigen::VectorXf mean, Eigen::MatrixXf basis, float mean_mass) {
+  if (basis.rows() != mean.size() || basis.cols() != WindowGrid::components) {
+    throw std::invalid_argument("a window eigenspace of length " + std::to_string(mean.size()) +
+                                " needs a basis of " + std::to_string(mean.size()) + "×" +
+                                std::to_string(WindowGrid::components) + ", not " +
+                                std::to_string(basis.rows()) + "×" + std::to_string(basis.cols()));
+  }
+  WindowSpace space;
+  space.mean_ = std::move(mean);
+  space.basis_ = std::move(basis);
+  space.offset_ = space.basis_.transpose() * space.mean_;
+  space.mean_mass_ = std::max(mean_mass, 1e-6F);
+  return space;
+}
+
+void WindowSpace::project(const CellMap& map, int stride, Eigen::MatrixXf& out,
+                          std::vector<float>* masses) const {
+  const int per_side = (WindowGrid::side - 1) / stride + 1;
+  const int count = per_side * per_side;
+  constexpr int longest = window_length(3);
+  float vector[longest];
+  out.resize(WindowGrid::components, count);
+  if (masses != nullptr) {
+    masses->resize(static_cast<std::size_t>(count));
+  }
+  for (int i = 0; i < count; ++i) {
+    const float mass = window_vector(map, i / per_side * stride, i % per_side * stride, vector);
+    multiply_transposed(basis_.data(), length(), WindowGrid::components, vector, out.col(i).data());
+    out.col(i) -= offset_;
+    if (masses != nullptr) {
+      (*masses)[static_cast<std::size_t>(i)] = mass;
+    }
+  }
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,115 @@
+// Scenes whose truth is known, and what is counted of them.
+#include "core/evaluation/composed_scenes.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "core/evaluation/evaluation.h"
+#include "tests/support/learned_world.h"
+
+namespace eigenpose {
+namespace {
+
+using testing::learned_world;
+
+std::vector<SetView> every_view() {
+  std::vector<SetView> views;
+  for (std::size_t s = 0; s < learned_world().sets.size(); ++s)
+    for (std::size_t v = 0; v < learned_world().sets[s].views().size(); ++v) views.push_back({s, v});
+  return views;
+}
+
+TEST(ComposedScenes, ObjectsStandApartUnlessAskedToTouch) {
+  const auto views = every_view();
+  SceneComposer apart(learned_world().sets, views, {}, {});
+  SceneComposer touching(learned_world().sets, views, {.overlap = 0.2}, {});
+  Segmenter segmenter;
+  for (std::size_t i = 0; i < 20; ++i) {
+    const ComposedScene scattered = apart.compose(i);
+    ASSERT_GE(scattered.objects.size(), 2U);
+    ASSERT_LE(scattered.objects.size(), 4U);
+    EXPECT_EQ(segmenter.segment(scattered.picture).size(), scattered.objects.size());
+    const ComposedScene fused = touching.compose(i);
+    ASSERT_EQ(fused.objects.size(), scattered.objects.size());
+    EXPECT_EQ(segmenter.segment(fused.picture).size(), 1U);
+  }
+}
+
+TEST(ComposedScenes, TellWhereEachObjectStands) {
+  const auto views = every_view();
+  SceneComposer composer(learned_world().sets, views, {}, {});
+  Segmenter segmenter;
+  const ComposedScene scene = composer.compose(3);
+  const auto regions = segmenter.segment(scene.picture);
+  for (const ComposedScene::Placed& placed : scene.objects) {
+    const bool seen = std::ranges::any_of(regions, [&](const Region& region) {
+      return (region.box & placed.box).area() >= 0.9 * placed.box.area();
+    });
+    EXPECT_TRUE(seen);
+  }
+}
+
+TEST(ComposedScenes, AreTheSameAgainAndDifferBySeed) {
+  const auto views = every_view();
+  SceneComposer first(learned_world().sets, views, {.overlap = 0.1, .seed = 5}, {});
+  SceneComposer again(learned_world().sets, views, {.overlap = 0.1, .seed = 5}, {});
+  SceneComposer other(learned_world().sets, views, {.overlap = 0.1, .seed = 6}, {});
+  first.compose(1);  // what came before does not matter
+  const cv::Mat picture = first.compose(2).picture;
+  const cv::Mat same = again.compose(2).picture;
+  ASSERT_EQ(picture.size(), same.size());
+  EXPECT_EQ(cv::norm(picture, same, cv::NORM_INF), 0.0);
+  const cv::Mat different = other.compose(2).picture;
+  EXPECT_TRUE(different.size() != picture.size() || cv::norm(picture, different, cv::NORM_INF) > 0.0);
+}
+
+TEST(ComposedScenes, RefuseWhatCannotBeComposed) {
+  const auto views = every_view();
+  EXPECT_THROW(SceneComposer(learned_world().sets, {}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(SceneComposer(learned_world().sets, views, {.overlap = 1.5}, {}), std::invalid_argument);
+}
+
+TEST(ComposedScenes, AreCountedByTheirTruth) {
+  const ImageSet& set = learned_world().sets[0];
+  ComposedScene scene;
+  for (const int x : {10, 100, 200}) scene.objects.push_back({{0, 0}, {x, 10, 50, 50}});
+  const auto said = [&](const cv::Rect& box, const std::string& object, Verdict verdict) {
+    Outcome outcome;
+    outcome.box = box;
+    outcome.verdict = verdict;
+    outcome.best = {object, {set.views()[0].q[0] + 4.0}, 0.1};
+    return outcome;
+  };
+  const std::vector<Outcome> outcomes = {
+      said({12, 12, 50, 50}, set.object(), Verdict::recognized),
+      said({100, 10, 50, 50}, set.object(), Verdict::unknown),
+      said({230, 40, 50, 50}, set.object(), Verdict::recognized),  // beside it
+      said({300, 300, 20, 20}, "another", Verdict::recognized),
+  };
+  SceneReport report;
+  count_scene(scene, learned_world().sets, outcomes, report);
+  EXPECT_EQ(report.scenes, 1U);
+  EXPECT_EQ(report.objects, 3U);
+  EXPECT_EQ(report.found, 2U);
+  EXPECT_EQ(report.right, 2U);
+  EXPECT_EQ(report.recognized, 1U);
+  EXPECT_EQ(report.extra, 2U);
+  ASSERT_EQ(report.pose_errors.size(), 2U);
+  EXPECT_NEAR(report.pose_errors[0], 4.0, 1e-9);
+}
+
+TEST(ComposedScenes, AreRecognisedWhereObjectsStandApart) {
+  EvaluationOptions options;
+  options.learning = testing::small_learning();
+  options.scenes.count = 20;
+  const EvaluationReport report = evaluate(learned_world().sets, options);
+  ASSERT_TRUE(report.scenes);
+  EXPECT_EQ(report.scenes->scenes, 20U);
+  EXPECT_EQ(report.scenes->found, report.scenes->objects);
+  EXPECT_GE(static_cast<double>(report.scenes->right), 0.95 * static_cast<double>(report.scenes->objects));
+  EXPECT_EQ(report.scenes->extra, 0U);
+}
+
+}  // namespace
+}  // namespace eigenpose

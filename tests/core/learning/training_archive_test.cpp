@@ -1,0 +1,248 @@
+#include "core/learning/training_archive.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/image/picture_file.h"
+#include "core/model/model_file.h"
+#include "tests/support/learned_world.h"
+
+namespace eigenpose {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class KeptViewsTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path(const std::string& name) const { return folder_.path() / name; }
+  [[nodiscard]] std::filesystem::path sets() const { return path("sets"); }
+  void write(const std::string& object, int kind) const { testing::write_turn(sets(), object, kind, 12); }
+
+  /// Learns all that stands in `sets` and keeps it in `file`.
+  void keep(const std::string& file, LearningOptions options = testing::small_learning()) const {
+    options.kept_views = path(file);
+    const auto images = open_image_sets(sets());
+    (void)learn(all_views(images), options);
+  }
+  /// The model file's bytes, but for the time it was learned.
+  [[nodiscard]] std::vector<unsigned char> bytes_of(Model model) const {
+    model.provenance.created = "then";
+    save_model(model, path("compared.model"));
+    return read_file(path("compared.model"));
+  }
+  [[nodiscard]] std::vector<unsigned char> learned_anew(
+      const LearningOptions& options = testing::small_learning()) const {
+    const auto images = open_image_sets(sets());
+    return bytes_of(learn(all_views(images), options));
+  }
+  [[nodiscard]] std::vector<unsigned char> updated(const std::string& file,
+                                                   const std::vector<std::string>& leaving,
+                                                   const std::vector<ImageSet>& joining,
+                                                   LearningOptions options) const {
+    const KeptViews kept(path(file));
+    options.program_version = testing::small_learning().program_version;
+    return bytes_of(learn(updated_sets(kept, leaving, joining), options));
+  }
+  [[nodiscard]] std::vector<unsigned char> updated(const std::string& file,
+                                                   const std::vector<std::string>& leaving,
+                                                   const std::vector<ImageSet>& joining = {}) const {
+    return updated(file, leaving, joining, KeptViews(path(file)).options());
+  }
+  [[nodiscard]] std::string refusal(const std::string& file) const {
+    try {
+      const KeptViews kept(path(file));
+      std::vector<std::uint8_t> pictures(kept.objects()[0].count * 32 * 32 * 3);
+      std::vector<float> energies(kept.objects()[0].count);
+      kept.read(0, pictures, energies);
+      (void)kept.products();
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+ private:
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(KeptViewsTest, AnObjectThatJoinsGivesTheModelLearnedAnewByteForByte) {
+  write("one", 1);
+  write("two", 2);
+  keep("kept");
+  std::filesystem::remove_all(sets());
+  write("fresh", 3);  // stands first in the order of names
+  const auto grown = updated("kept", {}, open_image_sets(sets()));
+  write("one", 1);
+  write("two", 2);
+  EXPECT_EQ(grown, learned_anew());
+}
+
+TEST_F(KeptViewsTest, WithoutAnObjectTheModelIsTheOneLearnedAnewByteForByte) {
+  write("one", 1);
+  write("two", 2);
+  write("three", 3);
+  keep("kept");
+  std::filesystem::remove_all(sets());
+  const auto shrunk = updated("kept", {"two"});
+  write("one", 1);
+  write("three", 3);
+  EXPECT_EQ(shrunk, learned_anew());
+}
+
+TEST_F(KeptViewsTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
+  LearningOptions gradient = testing::small_learning();
+  set_image_type(gradient.normalization, "gradient");
+  LearningOptions parts = testing::small_learning();
+  parts.parts = true;
+  LearningOptions krylov = testing::small_learning();
+  krylov.solver.solver = "krylov";
+  krylov.solver.components = 3;
+  krylov.solver.energy = 0.9;
+  for (const LearningOptions& options : {gradient, parts, krylov}) {
+    std::filesystem::remove_all(sets());
+    write("one", 1);
+    write("two", 2);
+    keep("kept", options);
+    EXPECT_EQ(KeptViews(path("kept")).products().size() > 0, options.solver.solver != "krylov");
+    std::filesystem::remove_all(sets());
+    write("three", 3);
+    const auto changed = updated("kept", {"one"}, open_image_sets(sets()));
+    write("two", 2);
+    EXPECT_EQ(changed, learned_anew(options)) << options.normalization.type << options.solver.solver;
+  }
+}
+
+TEST_F(KeptViewsTest, TheUpdateKeepsItsViewsInTurn) {
+  write("one", 1);
+  write("two", 2);
+  keep("kept");
+  std::filesystem::remove_all(sets());
+  write("three", 3);
+  LearningOptions options = KeptViews(path("kept")).options();
+  options.kept_views = path("kept");
+  (void)updated("kept", {"one"}, open_image_sets(sets()), options);
+  std::filesystem::remove_all(sets());
+  const auto last = updated("kept", {"two"});
+  write("three", 3);
+  EXPECT_EQ(last, learned_anew());
+}
+
+TEST_F(KeptViewsTest, ReadyCutViewsComeAndGoAmongOthers) {
+  write("one", 1);
+  ImageSetWriter writer(sets(), "cut", turntable_workspace(), nlohmann::json::object(),
+                        {.cropped = true, .sync_every_view = false});
+  for (int i = 0; i < 12; ++i) {
+    const cv::Mat scene = testing::scene_with(2, 30.0 * i);
+    writer.add(scene(cv::Rect(40, 20, 80, 80)), {30.0 * i});
+  }
+  writer.finish();
+  LearningOptions options = testing::small_learning();
+  options.parts = true;  // asks how large the regions were
+  keep("both", options);
+  const auto all = learned_anew(options);
+  std::filesystem::rename(sets() / "one", path("one"));
+  EXPECT_EQ(updated("both", {"one"}), learned_anew(options)) << "ready-cut ones are left";
+  keep("cut", options);
+  EXPECT_EQ(updated("cut", {}, open_image_sets(path("one"))), all) << "the others are joined";
+}
+
+TEST_F(KeptViewsTest, ViewsBeyondTheMemoryLimitComeAndGoToo) {
+  testing::write_turn(sets(), "one", 1, 36);
+  write("two", 2);
+  LearningOptions options = testing::small_learning();
+  options.solver.solver = "gram";
+  options.solver.components = 2;
+  keep("kept", options);
+  std::filesystem::remove_all(sets() / "two");
+  options.memory_limit = 70 * picture_length(options.normalization);  // pictures may take half: 35 of 36
+  options.scratch_folder = path("");
+  EXPECT_EQ(updated("kept", {"two"}, {}, options), learned_anew(options));
+}
+
+TEST_F(KeptViewsTest, RefusesNamesThatAreNotThereOrTaken) {
+  write("one", 1);
+  write("two", 2);
+  keep("kept");
+  const KeptViews kept(path("kept"));
+  const auto message = [&](const std::vector<std::string>& leaving, const std::vector<ImageSet>& joining) {
+    try {
+      (void)updated_sets(kept, leaving, joining);
+    } catch (const ConfigError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_THAT(message({"mug"}, {}), AllOf(HasSubstr("\"mug\""), HasSubstr("one, two")));
+  EXPECT_THAT(message({"one"}, open_image_sets(sets())), AllOf(HasSubstr("\"two\""), HasSubstr("already")));
+  EXPECT_EQ(message({"one"}, {ImageSet::open(sets() / "one")}), "accepted");
+}
+
+TEST_F(KeptViewsTest, RefusesAnotherNormalisation) {
+  write("one", 1);
+  keep("kept");
+  const KeptViews kept(path("kept"));
+  LearningOptions options = kept.options();
+  options.normalization.size = 24;
+  EXPECT_THROW((void)learn(updated_sets(kept, {}, {}), options), Error);
+  options = kept.options();
+  options.normalization.segmentation.noise_sigmas += 1.0;
+  EXPECT_THROW((void)learn(updated_sets(kept, {}, {}), options), Error);
+}
+
+TEST_F(KeptViewsTest, RefusesOneFlippedByteAnywhereAndAFileCutOff) {
+  write("one", 1);
+  keep("kept");
+  EXPECT_EQ(refusal("kept"), "accepted");
+  const auto bytes = read_file(path("kept"));
+  const auto put = [&](const std::vector<unsigned char>& changed) {
+    std::ofstream(path("kept"), std::ios::binary | std::ios::trunc)
+        .write(reinterpret_cast<const char*>(changed.data()), static_cast<std::streamsize>(changed.size()));
+  };
+  for (std::size_t i = 0; i < 200; ++i) {
+    const std::size_t at = i < 100 ? 6 * i : bytes.size() * (i - 99) / 101;
+    auto damaged = bytes;
+    damaged[at] ^= static_cast<unsigned char>(1U << (at % 8));
+    put(damaged);
+    EXPECT_THAT(refusal("kept"), AnyOf(HasSubstr("damaged"), HasSubstr("no file of kept views"),
+                                       HasSubstr("version"), HasSubstr("truncated")))
+        << "byte " << at;
+  }
+  for (std::size_t i = 0; i < 20; ++i) {
+    put({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(bytes.size() * i / 20)});
+    EXPECT_NE(refusal("kept"), "accepted") << i;
+  }
+  auto other = bytes;
+  const std::string text(other.begin(), other.begin() + 100);
+  other[text.find("version 1") + 8] = '7';
+  put(other);
+  EXPECT_THAT(refusal("kept"), AllOf(HasSubstr("version 7"), HasSubstr("--keep-views")));
+  std::filesystem::remove(path("kept"));
+  EXPECT_THAT(refusal("kept"), HasSubstr("no kept views"));
+}
+
+TEST_F(KeptViewsTest, AreNotTouchedWhereLearningFails) {
+  write("one", 1);
+  keep("kept");
+  const auto before = read_file(path("kept"));
+  write("two", 2);
+  LearningOptions options = testing::small_learning();
+  options.kept_views = path("kept");
+  std::stop_source stop;
+  const auto images = open_image_sets(sets());
+  const auto stop_late = [&](const ProgressUpdate& update) {
+    if (update.stage != "normalising" && update.stage != "inner products") stop.request_stop();
+  };
+  EXPECT_THROW((void)learn(all_views(images), options, nullptr, stop_late, stop.get_token()), Interrupted);
+  EXPECT_EQ(read_file(path("kept")), before);
+  for (const auto& entry : std::filesystem::directory_iterator(path("")))
+    EXPECT_THAT(entry.path().filename().string(), AnyOf("kept", "sets"));
+}
+
+}  // namespace
+}  // namespace eigenpose

@@ -1,0 +1,69 @@
+#include "core/windows/orientation_grid.h"
+
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "core/windows/foreshortened_views.h"
+#include "tests/support/drawn_pictures.h"
+
+namespace eigenpose {
+namespace {
+
+CellMap map_of(const cv::Mat& picture) {
+  CellMapper mapper;
+  CellMap map;
+  mapper.compute(picture, map);
+  return map;
+}
+
+TEST(CellMap, OfAMirroredPictureIsTheMirroredMap) {
+  const cv::Mat picture = test::DrawnObject(1).view(40.0);
+  const CellMap map = map_of(picture);
+  const CellMap other = map_of(mirrored(picture));
+  // Rounding only: the same sums in another order.
+  constexpr float tolerance = 2e-4F;
+  for (int r = 0; r < CellMap::side; ++r) {
+    for (int c = 0; c < CellMap::side; ++c) {
+      const int m = CellMap::side - 1 - c;
+      EXPECT_NEAR(map.brightness_at(r, c)[0], other.brightness_at(r, m)[0], tolerance);
+      for (int b = 0; b < CellMap::bins; ++b) {
+        // Left and right change places: angle a becomes 180° − a.
+        const int turned = (CellMap::bins / 2 - b + CellMap::bins) % CellMap::bins;
+        EXPECT_NEAR(map.orientation_at(r, c)[b], other.orientation_at(r, m)[turned], tolerance);
+      }
+    }
+  }
+}
+
+TEST(CellMap, PutsAnEdgeIntoTheBinOfItsDirection) {
+  cv::Mat picture(64, 64, CV_8UC1, cv::Scalar(0));
+  picture.colRange(32, 64).setTo(255);  // brighter to the right: gradient along +x, bin 0
+  const CellMap map = map_of(picture);
+  double right = 0.0;
+  double all = 0.0;
+  for (int i = 0; i < CellMap::side * CellMap::side; ++i) {
+    right += map.orientation[static_cast<std::size_t>(i) * CellMap::bins];
+    all += std::accumulate(map.orientation.begin() + i * CellMap::bins,
+                           map.orientation.begin() + (i + 1) * CellMap::bins, 0.0);
+  }
+  EXPECT_GT(all, 0.0);
+  EXPECT_NEAR(right, all, 1e-6 * all);
+}
+
+TEST(CellMap, IsZeroInItsFrame) {
+  const CellMap map = map_of(cv::Mat(64, 64, CV_8UC1, cv::Scalar(200)));
+  EXPECT_EQ(map.brightness_at(1, 7)[0], 0.0F);
+  EXPECT_GT(map.brightness_at(2, 7)[0], 0.0F);
+  EXPECT_NEAR(map.brightness_at(10, 10)[0], std::sqrt(200.0F / 255.0F), 1e-4F);
+}
+
+TEST(CellMap, RefusesAPictureThatIsNotSquare) {
+  CellMapper mapper;
+  CellMap map;
+  EXPECT_THROW(mapper.compute(cv::Mat(64, 60, CV_8UC1, cv::Scalar(0)), map), std::invalid_argument);
+  EXPECT_THROW(mapper.compute(cv::Mat(64, 64, CV_32FC1, cv::Scalar(0)), map), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace eigenpose
