@@ -29,7 +29,7 @@ Misalignment as_misalignment(const Vector5& v) {
 }
 
 /// Index of the sample that is `steps` away from `t` along axis `a`, or −1 beyond an open end.
-std::ptrdiff_t neighbour(const PoseSpace& space, std::size_t t, std::size_t a, int steps) {
+std::ptrdiff_t neighbour(const AlignmentEigenspace& space, std::size_t t, std::size_t a, int steps) {
   const auto& counts = space.sample_counts();
   std::size_t stride = 1;
   for (std::size_t i = counts.size(); i-- > a + 1;) {
@@ -55,8 +55,8 @@ Vector5 AlignmentPrior::precision() const {
   return sigma.cwiseAbs2().cwiseInverse();
 }
 
-void PoseAligner::project(const PoseSpace& space, const PoseScale& scale, const PosePicture& picture,
-                          const Misalignment& p) {
+void PoseAligner::project(const AlignmentEigenspace& space, const PoseScale& scale,
+                          const PosePicture& picture, const Misalignment& p) {
   Eigen::MatrixXf& warped = &scale == &space.coarse() ? coarse_warped_ : fine_warped_;
   scale.warp(picture, p, true, warped);
   dimensions_ = scale.basis.cols();
@@ -70,7 +70,8 @@ void PoseAligner::project(const PoseSpace& space, const PoseScale& scale, const 
   set_prior(p);
 }
 
-void PoseAligner::project_picture(const PoseSpace& space, const PosePicture& picture, const Misalignment& p) {
+void PoseAligner::project_picture(const AlignmentEigenspace& space, const PosePicture& picture,
+                                  const Misalignment& p) {
   const PoseScale& scale = space.coarse();
   scale.warp(picture, p, false, coarse_warped_);
   multiply_transposed(scale.basis.data(), static_cast<int>(scale.basis.rows()), static_cast<int>(dimensions_),
@@ -111,7 +112,7 @@ double PoseAligner::cost_at(const float* point, Vector5* x) const {
   return static_cast<double>(squared) + prior_cost_ - b.dot(best);
 }
 
-void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std::size_t start,
+void PoseAligner::follow(const PosePicture& picture, const AlignmentEigenspace& space, std::size_t start,
                          AlignedPose& end) {
   const auto& counts = space.sample_counts();
   std::size_t here = start;
@@ -190,7 +191,7 @@ void PoseAligner::follow(const PosePicture& picture, const PoseSpace& space, std
   if (dofs > 1) relate(space, variance, end);
 }
 
-void PoseAligner::relate(const PoseSpace& space, double variance, AlignedPose& pose) const {
+void PoseAligner::relate(const AlignmentEigenspace& space, double variance, AlignedPose& pose) const {
   const Eigen::MatrixXd jacobian = space.coarse_manifold().evaluate_with_jacobian(pose.q).jacobian;
   const Eigen::MatrixXd with_misalignment = tangents().cast<double>().transpose() * jacobian;
   set_covariance(
@@ -198,7 +199,8 @@ void PoseAligner::relate(const PoseSpace& space, double variance, AlignedPose& p
       variance, pose.q_covariance);
 }
 
-double PoseAligner::fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose) {
+double PoseAligner::fine_cost(const PosePicture& picture, const AlignmentEigenspace& space,
+                              const AlignedPose& pose) {
   project(space, space.fine(), picture, pose.misalignment);
   const Dof& dof = space.fine_manifold().axes()[0].dof;
   double lowest = std::numeric_limits<double>::infinity();
@@ -213,7 +215,8 @@ double PoseAligner::fine_cost(const PosePicture& picture, const PoseSpace& space
   return lowest;
 }
 
-const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture, const PoseSpace& space) {
+const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture,
+                                                   const AlignmentEigenspace& space) {
   project(space, space.coarse(), picture, {});
   unmoved_ = projected_;
   unmoved_inverse_ = inverse_;

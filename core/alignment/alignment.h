@@ -64,13 +64,13 @@ class PoseAligner {
   explicit PoseAligner(AlignmentOptions options) : options_(options), precision_(options.prior.precision()) {}
 
   /// Poses of `space` that fit, best first, different from each other. Valid until the next call.
-  const std::vector<AlignedPose>& align(const PosePicture& picture, const PoseSpace& space);
+  const std::vector<AlignedPose>& align(const PosePicture& picture, const AlignmentEigenspace& space);
 
  private:
-  void project(const PoseSpace& space, const PoseScale& scale, const PosePicture& picture,
+  void project(const AlignmentEigenspace& space, const PoseScale& scale, const PosePicture& picture,
                const Misalignment& p);
   /// The same picture again, moved a little more: J stays, as it hardly changes any more.
-  void project_picture(const PoseSpace& space, const PosePicture& picture, const Misalignment& p);
+  void project_picture(const AlignmentEigenspace& space, const PosePicture& picture, const Misalignment& p);
   /// The normal equations of J.
   void prepare();
   void set_prior(const Misalignment& p);
@@ -80,11 +80,12 @@ class PoseAligner {
   }
   /// Cost of one manifold point after its best misalignment, which goes to `x`.
   double cost_at(const float* point, Eigen::Matrix<double, 5, 1>* x) const;
-  void follow(const PosePicture& picture, const PoseSpace& space, std::size_t start, AlignedPose& end);
-  double fine_cost(const PosePicture& picture, const PoseSpace& space, const AlignedPose& pose);
+  void follow(const PosePicture& picture, const AlignmentEigenspace& space, std::size_t start,
+              AlignedPose& end);
+  double fine_cost(const PosePicture& picture, const AlignmentEigenspace& space, const AlignedPose& pose);
   /// Where there are several DOFs, their covariance together, as the normal equations of the last round have
   /// it. @param variance of each number of a point.
-  void relate(const PoseSpace& space, double variance, AlignedPose& pose) const;
+  void relate(const AlignmentEigenspace& space, double variance, AlignedPose& pose) const;
 
   AlignmentOptions options_;
   Eigen::Matrix<double, 5, 1> precision_;

@@ -206,11 +206,12 @@ void PoseScale::warp(const PosePicture& picture, const Misalignment& misalignmen
   }
 }
 
-PoseSpace PoseSpace::learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views) {
+AlignmentEigenspace AlignmentEigenspace::learn(const std::vector<SampleAxis>& axes,
+                                               const std::vector<PosePicture>& views) {
   if (views.size() < 2) {
     throw std::invalid_argument("a pose space needs at least 2 views, got " + std::to_string(views.size()));
   }
-  PoseSpace space;
+  AlignmentEigenspace space;
   Eigen::MatrixXd points;
   for (const int side : {coarse_side, fine_side}) {
     PoseScale& scale = side == coarse_side ? space.coarse_ : space.fine_;
@@ -244,8 +245,9 @@ PoseSpace PoseSpace::learn(const std::vector<SampleAxis>& axes, const std::vecto
   return space;
 }
 
-PoseSpace PoseSpace::from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,
-                                Manifold coarse_manifold, Manifold fine_manifold) {
+AlignmentEigenspace AlignmentEigenspace::from_parts(PoseScale coarse, PoseScale fine,
+                                                    Eigen::VectorXf pixel_mean, Manifold coarse_manifold,
+                                                    Manifold fine_manifold) {
   const auto fits = [](const PoseScale& scale, const Manifold& manifold) {
     return scale.basis.rows() == static_cast<Eigen::Index>(scale.side) * scale.side &&
            scale.mean.size() == scale.basis.cols() && manifold.dimensions() == scale.basis.cols();
@@ -254,7 +256,7 @@ PoseSpace PoseSpace::from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorX
       !fits(fine, fine_manifold) || pixel_mean.size() != coarse.basis.rows()) {
     throw std::invalid_argument("has a pose space whose parts do not fit together");
   }
-  PoseSpace space;
+  AlignmentEigenspace space;
   space.coarse_ = std::move(coarse);
   space.fine_ = std::move(fine);
   space.pixel_mean_ = std::move(pixel_mean);
@@ -264,7 +266,7 @@ PoseSpace PoseSpace::from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorX
   return space;
 }
 
-void PoseSpace::make_samples() {
+void AlignmentEigenspace::make_samples() {
   const auto axes = coarse_manifold_->axes();
   std::size_t total = 1;
   sample_counts_.clear();
@@ -310,12 +312,12 @@ void PoseSpace::make_samples() {
   }
 }
 
-void PoseSpace::render(std::span<const double> q, Eigen::VectorXf& out) const {
+void AlignmentEigenspace::render(std::span<const double> q, Eigen::VectorXf& out) const {
   out.noalias() = coarse_.basis * coarse_manifold_->evaluate(q).cast<float>();
   out += pixel_mean_;
 }
 
-std::size_t PoseSpace::memory() const {
+std::size_t AlignmentEigenspace::memory() const {
   const auto floats = coarse_.basis.size() + fine_.basis.size() + samples_.size();
   return static_cast<std::size_t>(floats) * sizeof(float);
 }

@@ -42,17 +42,18 @@ struct PoseScale {
 };
 
 /// What is learned of one object's pose. Value type; const calls are thread-safe.
-class PoseSpace {
+class AlignmentEigenspace {
  public:
-  PoseSpace() = default;
+  AlignmentEigenspace() = default;
   /// @param axes the grid of the views; @param views in the order of Manifold::interpolate (last axis
   /// fastest).
   /// @throws std::invalid_argument for fewer than two views or sizes that do not fit.
-  static PoseSpace learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views);
+  static AlignmentEigenspace learn(const std::vector<SampleAxis>& axes,
+                                   const std::vector<PosePicture>& views);
 
   /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
-  static PoseSpace from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,
-                              Manifold coarse_manifold, Manifold fine_manifold);
+  static AlignmentEigenspace from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,
+                                        Manifold coarse_manifold, Manifold fine_manifold);
 
   [[nodiscard]] const PoseScale& coarse() const { return coarse_; }
   /// Mean picture of the coarse scale, 32² pixels.

@@ -40,7 +40,8 @@ MaskedAligner::MaskedAligner(const AlignmentOptions& options) : options_(options
   precision_ = prior.precision();
 }
 
-void MaskedAligner::look(const PosePicture& picture, const PoseSpace& space, std::span<const float> trust) {
+void MaskedAligner::look(const PosePicture& picture, const AlignmentEigenspace& space,
+                         std::span<const float> trust) {
   picture_ = &picture;
   space_ = &space;
   trust_ = trust;

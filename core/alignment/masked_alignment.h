@@ -32,7 +32,7 @@ class MaskedAligner {
 
   /// The region and the object that the others are about. Both must stay until the last call of them.
   /// @param trust 32×32 numbers 0…1, row by row.
-  void look(const PosePicture& picture, const PoseSpace& space, std::span<const float> trust);
+  void look(const PosePicture& picture, const AlignmentEigenspace& space, std::span<const float> trust);
   /// The first rounds from a pose, on the coarse scale, by what the windows trust. Cheap beside `refine`.
   /// @param reach how far a round may move the pose, as a share of each DOF's range.
   MaskedPose approach(std::span<const double> start, double reach);
@@ -62,7 +62,7 @@ class MaskedAligner {
   AlignmentOptions options_;
   Vector5 precision_;
   const PosePicture* picture_ = nullptr;
-  const PoseSpace* space_ = nullptr;
+  const AlignmentEigenspace* space_ = nullptr;
   std::span<const float> trust_;
   double pixel_variance_ = 0.0;
 

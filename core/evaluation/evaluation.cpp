@@ -96,7 +96,7 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
     auto parts = std::make_shared<PartsModel>(*model.parts);
     const MatchThresholds thresholds = match_thresholds(learning.match, options, object);
     parts->sure_ratio = thresholds.sure_ratio;
-    parts->covered_evidence = covered_threshold(learning.covered, options.stranger_rate, object);
+    parts->covered_evidence = occlusion_threshold(learning.covered, options.stranger_rate, object);
     for (std::size_t o = 0; o < learning.match.size(); ++o) {
       PartsCalibration& own = parts->calibration[o];
       own.rejection_distance = thresholds.rejection_distance[o];

@@ -23,7 +23,7 @@ void sort_by_distance(std::vector<Resemblance>& found) {
 /// What the views of object `o` would pass for, one entry a pair.
 std::vector<Resemblance> seen_from(const Model& model, const ManifoldSearch& search, std::size_t o,
                                    double reach) {
-  const PoseTable table(model.objects[o].manifold);
+  const ManifoldSamples table(model.objects[o].manifold);
   std::map<std::size_t, Resemblance> by_other;
   std::vector<ClosestPoint> near(std::min(most_near, model.objects.size()));
   for (std::size_t s = 0; s < table.samples(); ++s) {
@@ -81,7 +81,7 @@ std::vector<Resemblance> alike_poses(const Model& model, unsigned threads) {
   std::vector<Resemblance> all(model.objects.size());
   parallel_for(all.size(), threads, [&](std::size_t o) {
     const ModelObject& object = model.objects[o];
-    PoseTable table(object.manifold);
+    ManifoldSamples table(object.manifold);
     std::vector<double> other_q(table.dofs());
     Resemblance& worst = all[o];
     worst.first = worst.second = o;

@@ -71,9 +71,9 @@ std::string name_pose(const Workspace& workspace, const std::vector<SampleAxis>&
 
 }  // namespace
 
-PoseGrid find_pose_grid(const Workspace& workspace, std::span<const std::vector<double>> poses,
-                        const std::string& object) {
-  PoseGrid grid;
+LearnedGrid find_learned_grid(const Workspace& workspace, std::span<const std::vector<double>> poses,
+                              const std::string& object) {
+  LearnedGrid grid;
   std::vector<std::size_t> cell_of_view(poses.size(), 0);
   std::size_t cells = 1;
   for (std::size_t d = 0; d < workspace.size(); ++d) {

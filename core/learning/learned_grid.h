@@ -13,7 +13,7 @@
 namespace eigenpose {
 
 /// Views in a grid.
-struct PoseGrid {
+struct LearnedGrid {
   std::vector<SampleAxis> axes;
   /// order[cell] is the view that stands there; the last axis runs fastest.
   std::vector<std::size_t> order;
@@ -24,7 +24,7 @@ struct PoseGrid {
 /// @param object for errors only.
 /// @throws Error when a cell is empty or taken twice, or a periodic DOF has two values only: the text names
 /// them.
-PoseGrid find_pose_grid(const Workspace& workspace, std::span<const std::vector<double>> poses,
-                        const std::string& object);
+LearnedGrid find_learned_grid(const Workspace& workspace, std::span<const std::vector<double>> poses,
+                              const std::string& object);
 
 }  // namespace eigenpose

@@ -55,7 +55,7 @@ void check_dimensions(const ObjectViews& object, Eigen::Index dimensions) {
 }
 
 /// The pictures of a store, object by object, as partial matching learns them.
-std::vector<PartsViews> parts_views(const ViewStore& views) {
+std::vector<PartsViews> parts_views(const TrainingViews& views) {
   std::vector<PartsViews> result;
   for (const ObjectViews& object : views.objects())
     result.push_back({object.axes, object.count,
@@ -112,7 +112,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   // A pose space is an object's own already, and windows are the second look.
   options.object_spaces = options.object_spaces && !options.parts;
 
-  const ViewStore views(sets, store_options(options), progress, stop);
+  const TrainingViews views(sets, store_options(options), progress, stop);
   told.views = views.count();
   KnownProducts known = known_products(sets, views);
   if (!known.rows.empty()) options.solver.known = &known;
@@ -121,7 +121,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   if (options.memory_limit > 0)
     options.solver.memory_limit = options.memory_limit > held ? options.memory_limit - held : 1;
   const std::string created = utc_now();
-  std::optional<KeptViewsWriter> kept;
+  std::optional<TrainingArchiveWriter> kept;
   if (!options.kept_views.empty()) {
     kept.emplace(options.kept_views, views, options, created);
     options.solver.keep_products = [&kept](const Eigen::MatrixXd& products) { kept->write(products); };
@@ -148,11 +148,11 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
       measure_rejection(views, model.eigenspace, points, manifolds, options.rejection, progress, stop);
   told.rejection_time = watch.lap();
 
-  std::vector<ObjectSpace> spaces;
+  std::vector<ObjectEigenspace> spaces;
   if (options.object_spaces)
-    spaces =
-        learn_object_spaces(views, told.evidence, options.spline_degree, options.threads, progress, stop);
-  told.object_space_time = watch.lap();
+    spaces = learn_object_eigenspaces(views, told.evidence, options.spline_degree, options.threads, progress,
+                                      stop);
+  told.object_eigenspace_time = watch.lap();
   for (std::size_t o = 0; o < manifolds.size(); ++o) {
     const ObjectViews& object = views.objects()[o];
     const RejectionEvidence& evidence = told.evidence[o];
@@ -184,10 +184,10 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
       parts->calibration[o].sure_distance = match.sure_distance[o];
       parts->calibration[o].typical_distance = told.match[o].typical_distance;
     }
-    CoveredCalibrationOptions covered_options;
-    covered_options.threads = options.threads;
-    told.covered = measure_covered(*parts, pictures, covered_options, progress, stop);
-    parts->covered_evidence = covered_threshold(told.covered, options.match.stranger_rate);
+    OcclusionCalibrationOptions occlusion_options;
+    occlusion_options.threads = options.threads;
+    told.covered = measure_occlusion(*parts, pictures, occlusion_options, progress, stop);
+    parts->covered_evidence = occlusion_threshold(told.covered, options.match.stranger_rate);
     told.parts_time = watch.lap();
   }
   model.provenance = {options.program_version, created,

@@ -50,12 +50,12 @@ struct LearningReport {
   SolverReport solver;
   std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
   std::vector<MatchEvidence> match;         ///< the same of the aligned match; empty without parts
-  std::vector<CoveredEvidence> covered;  ///< learned views as strangers to the windows; empty without parts
+  std::vector<OcclusionEvidence> covered;  ///< learned views as strangers to the windows; empty without parts
   Duration normalize_time{};
   Duration eigenspace_time{};
   Duration manifold_time{};
   Duration rejection_time{};
-  Duration object_space_time{};
+  Duration object_eigenspace_time{};
   Duration parts_time{};  ///< windows, pose spaces and their calibration
   Duration total_time{};
 };

@@ -26,7 +26,7 @@ double bounded_mean(const std::vector<double>& errors, double most) {
 }
 
 /// The object's views reduced and of unit energy, one column each.
-Eigen::MatrixXf reduced_views(const ViewStore& views, const ObjectViews& object) {
+Eigen::MatrixXf reduced_views(const TrainingViews& views, const ObjectViews& object) {
   const NormalizationOptions& options = views.normalization();
   const int side = reduced_side(options);
   const int bands = appearance_bands(options);
@@ -56,12 +56,12 @@ Eigen::MatrixXd project(const Eigenspace& space, const Eigen::MatrixXf& columns)
 
 }  // namespace
 
-std::vector<ObjectSpace> learn_object_spaces(const ViewStore& views,
-                                             std::span<const RejectionEvidence> evidence, int degree,
-                                             unsigned threads, const Progress& progress,
-                                             std::stop_token stop) {
+std::vector<ObjectEigenspace> learn_object_eigenspaces(const TrainingViews& views,
+                                                       std::span<const RejectionEvidence> evidence,
+                                                       int degree, unsigned threads, const Progress& progress,
+                                                       std::stop_token stop) {
   const auto objects = views.objects();
-  std::vector<std::optional<ObjectSpace>> spaces(objects.size());
+  std::vector<std::optional<ObjectEigenspace>> spaces(objects.size());
   std::mutex progress_mutex;
   std::size_t done = 0;  // guarded by progress_mutex
   parallel_for(objects.size(), threads, [&](std::size_t o) {
@@ -81,11 +81,11 @@ std::vector<ObjectSpace> learn_object_spaces(const ViewStore& views,
     const SampleAxis& axis = object.axes.front();
     const double step = axis.dof.period() / static_cast<double>(axis.samples.size());
     const bool better = !errors.empty() && bounded_mean(errors, step) < bounded_mean(universal, step);
-    spaces[o] = ObjectSpace{std::move(space), std::move(manifold), better};
+    spaces[o] = ObjectEigenspace{std::move(space), std::move(manifold), better};
     const std::lock_guard lock(progress_mutex);
     if (progress) progress({"learning each object's own space", ++done, objects.size()});
   });
-  std::vector<ObjectSpace> result;
+  std::vector<ObjectEigenspace> result;
   for (auto& space : spaces) result.push_back(std::move(*space));
   return result;
 }

@@ -15,9 +15,9 @@ namespace eigenpose {
 
 /// One space an object of `views`. Where left-out views are found better than in the universal eigenspace
 /// (mean |error| of the first DOF, from `evidence`), the space is marked for pose.
-std::vector<ObjectSpace> learn_object_spaces(const ViewStore& views,
-                                             std::span<const RejectionEvidence> evidence, int degree,
-                                             unsigned threads, const Progress& progress,
-                                             std::stop_token stop);
+std::vector<ObjectEigenspace> learn_object_eigenspaces(const TrainingViews& views,
+                                                       std::span<const RejectionEvidence> evidence,
+                                                       int degree, unsigned threads, const Progress& progress,
+                                                       std::stop_token stop);
 
 }  // namespace eigenpose

@@ -86,9 +86,9 @@ std::vector<Lane> make_lanes(const PartsViews& views, bool companions, PartsObje
   return lanes;
 }
 
-double median_left_out_error(const std::vector<PoseSpace>& spaces) {
+double median_left_out_error(const std::vector<AlignmentEigenspace>& spaces) {
   std::vector<double> medians;
-  for (const PoseSpace& space : spaces) {
+  for (const AlignmentEigenspace& space : spaces) {
     std::vector<double> errors = space.left_out_errors();
     if (errors.empty()) {
       continue;
@@ -126,16 +126,16 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
     first[o] = views;
     views += objects[o].count;
   }
-  std::vector<CellMap> maps(views);
+  std::vector<OrientationGrid> maps(views);
   parallel_for(count, options.threads, [&](std::size_t o) {
     check_stop(stop);
-    CellMapper mapper;
+    OrientationGridMaker mapper;
     for (std::size_t v = 0; v < objects[o].count; ++v) {
       mapper.compute(objects[o].view(v), maps[first[o] + v]);
     }
   });
   model.background = background_level(maps);
-  for (CellMap& map : maps) {
+  for (OrientationGrid& map : maps) {
     take_off(model.background, map);
   }
   model.space = WindowSpace::learn(maps, options.threads);
@@ -144,8 +144,8 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   std::vector<float> largest(count, 0.0F);
   parallel_for(count, options.threads, [&](std::size_t o) {
     check_stop(stop);
-    CellMapper mapper(model.background);
-    CellMap made;
+    OrientationGridMaker mapper(model.background);
+    OrientationGrid made;
     for (const Lane& lane :
          make_lanes(objects[o], sparse(objects[o].axes, options.sparse_step), model.objects[o])) {
       if (!lane.picture.empty()) mapper.compute(lane.picture, made);
@@ -168,7 +168,7 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
     for (std::size_t v = 0; v < objects[o].count; ++v) {
       make_pose_picture(objects[o].view(v), pictures[v]);
     }
-    model.poses[o] = PoseSpace::learn(objects[o].axes, pictures);
+    model.poses[o] = AlignmentEigenspace::learn(objects[o].axes, pictures);
     if (progress && o % 8 == 0) {
       progress({"learning pose spaces", o, count});
     }

@@ -42,7 +42,7 @@ LearningOptions read_options(const Hdf5Group& group) {
   return options;
 }
 
-void write_object(const Hdf5Group& group, const ViewStore& views, const ObjectViews& object) {
+void write_object(const Hdf5Group& group, const TrainingViews& views, const ObjectViews& object) {
   group.write("name", object.object);
   group.write("cropped", std::int64_t{object.cropped});
   group.write("pictures", std::span<const std::uint8_t>(views.pictures(object.first, object.count)));
@@ -99,7 +99,7 @@ auto with_hdf5(const std::filesystem::path& file, const Work& work) {
   }
 }
 
-ConfigError not_there(const KeptViews& kept, const std::string& name) {
+ConfigError not_there(const TrainingArchive& kept, const std::string& name) {
   std::string text = "there is no object \"" + name + "\" to remove; there are:";
   for (const ObjectViews& object : kept.objects()) {
     text += object.first == 0 ? " " : ", ";
@@ -118,13 +118,13 @@ std::filesystem::path checked(std::filesystem::path file) {
 }  // namespace
 
 /// The open file. To be made, used and destroyed under an Hdf5Lock.
-struct KeptViews::File {
+struct TrainingArchive::File {
   explicit File(const std::filesystem::path& path) : handle(open_hdf5(path)), root(root_of(handle)) {}
   Hdf5Handle handle;
   Hdf5Group root;
 };
 
-KeptViews::KeptViews(std::filesystem::path file) : file_(checked(std::move(file))) {
+TrainingArchive::TrainingArchive(std::filesystem::path file) : file_(checked(std::move(file))) {
   with_hdf5(file_, [&] {
     open_ = std::make_unique<File>(file_);
     created_ = open_->root.read_text("created");
@@ -138,12 +138,12 @@ KeptViews::KeptViews(std::filesystem::path file) : file_(checked(std::move(file)
   });
 }
 
-KeptViews::~KeptViews() {
+TrainingArchive::~TrainingArchive() {
   const Hdf5Lock lock;
   open_.reset();
 }
 
-bool KeptViews::belong_to(const Model& model) const {
+bool TrainingArchive::belong_to(const Model& model) const {
   return created_ == model.provenance.created &&
          std::equal(objects_.begin(), objects_.end(), model.objects.begin(), model.objects.end(),
                     [](const ObjectViews& views, const ModelObject& object) {
@@ -151,7 +151,7 @@ bool KeptViews::belong_to(const Model& model) const {
                     });
 }
 
-void KeptViews::read(std::size_t o, std::span<std::uint8_t> pictures, std::span<float> energies) const {
+void TrainingArchive::read(std::size_t o, std::span<std::uint8_t> pictures, std::span<float> energies) const {
   with_hdf5(file_, [&] {
     const Hdf5Group object = open_->root.open_group("objects").open_group(numbered(o));
     object.read_bytes("pictures", pictures);
@@ -162,7 +162,7 @@ void KeptViews::read(std::size_t o, std::span<std::uint8_t> pictures, std::span<
   });
 }
 
-Eigen::MatrixXd KeptViews::products() const {
+Eigen::MatrixXd TrainingArchive::products() const {
   return with_hdf5(file_, [&] {
     if (!open_->root.has("products")) return Eigen::MatrixXd();
     Eigen::MatrixXd products = open_->root.read_doubles("products");
@@ -173,11 +173,11 @@ Eigen::MatrixXd KeptViews::products() const {
   });
 }
 
-KeptViewsWriter::KeptViewsWriter(const std::filesystem::path& file, const ViewStore& views,
-                                 const LearningOptions& options, std::string created)
+TrainingArchiveWriter::TrainingArchiveWriter(const std::filesystem::path& file, const TrainingViews& views,
+                                             const LearningOptions& options, std::string created)
     : target_(file), file_(file), views_(views), options_(options), created_(std::move(created)) {}
 
-void KeptViewsWriter::write(const Eigen::MatrixXd& products) {
+void TrainingArchiveWriter::write(const Eigen::MatrixXd& products) {
   try {
     const Hdf5Lock lock;
     const Hdf5Handle file = create_hdf5(file_.part(), seal_size);
@@ -195,12 +195,12 @@ void KeptViewsWriter::write(const Eigen::MatrixXd& products) {
   written_ = true;
 }
 
-void KeptViewsWriter::commit() {
+void TrainingArchiveWriter::commit() {
   if (!written_) write({});
   file_.commit();
 }
 
-std::vector<TrainingSet> updated_sets(const KeptViews& kept, std::span<const std::string> leaving,
+std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<const std::string> leaving,
                                       std::span<const ImageSet> joining) {
   for (const std::string& name : leaving)
     if (std::none_of(kept.objects().begin(), kept.objects().end(),
@@ -223,7 +223,7 @@ std::vector<TrainingSet> updated_sets(const KeptViews& kept, std::span<const std
   return sets;
 }
 
-KnownProducts known_products(std::span<const TrainingSet> sets, const ViewStore& views) {
+KnownProducts known_products(std::span<const TrainingSet> sets, const TrainingViews& views) {
   KnownProducts known;
   const auto first =
       std::find_if(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.kept != nullptr; });

@@ -31,13 +31,13 @@
 namespace eigenpose {
 
 /// Views as a file keeps them. Pictures stay on disk until they are read. Const calls are thread-safe.
-class KeptViews {
+class TrainingArchive {
  public:
   /// Checks the whole file. @throws FileError saying what is wrong and what to do.
-  explicit KeptViews(std::filesystem::path file);
-  KeptViews(const KeptViews&) = delete;
-  KeptViews& operator=(const KeptViews&) = delete;
-  ~KeptViews();
+  explicit TrainingArchive(std::filesystem::path file);
+  TrainingArchive(const TrainingArchive&) = delete;
+  TrainingArchive& operator=(const TrainingArchive&) = delete;
+  ~TrainingArchive();
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   /// The model was learned from these views: of the same objects, at the same time.
@@ -63,11 +63,11 @@ class KeptViews {
 };
 
 /// Keeps views while they are learned: the file appears, or replaces the former one, at `commit`.
-class KeptViewsWriter {
+class TrainingArchiveWriter {
  public:
   /// @param views outlives the writer.
-  KeptViewsWriter(const std::filesystem::path& file, const ViewStore& views, const LearningOptions& options,
-                  std::string created);
+  TrainingArchiveWriter(const std::filesystem::path& file, const TrainingViews& views,
+                        const LearningOptions& options, std::string created);
   /// At most once. @param products 0 × 0 where there are none. @throws FileError.
   void write(const Eigen::MatrixXd& products);
   /// @throws FileError.
@@ -76,7 +76,7 @@ class KeptViewsWriter {
  private:
   std::filesystem::path target_;
   AtomicFile file_;
-  const ViewStore& views_;
+  const TrainingViews& views_;
   LearningOptions options_;
   std::string created_;
   bool written_ = false;
@@ -87,11 +87,11 @@ class KeptViewsWriter {
 /// all their image sets.
 /// @throws ConfigError for an object to remove that is not there, or one that joins under a name that is
 /// taken.
-std::vector<TrainingSet> updated_sets(const KeptViews& kept, std::span<const std::string> leaving,
+std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<const std::string> leaving,
                                       std::span<const ImageSet> joining);
 
 /// The kept products of views that stand in `views`, whose objects were made from `sets` one by one. No rows
 /// where there are none.
-KnownProducts known_products(std::span<const TrainingSet> sets, const ViewStore& views);
+KnownProducts known_products(std::span<const TrainingSet> sets, const TrainingViews& views);
 
 }  // namespace eigenpose

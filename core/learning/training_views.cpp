@@ -146,8 +146,8 @@ bool TrainingSet::cropped() const {
   return kept != nullptr ? kept->objects()[kept_object].cropped : images->cropped();
 }
 
-ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& options,
-                     const Progress& progress, std::stop_token stop)
+TrainingViews::TrainingViews(std::span<const TrainingSet> sets, const ViewStoreOptions& options,
+                             const Progress& progress, std::stop_token stop)
     : options_(options.normalization), length_(appearance_length(options_)) {
   if (sets.empty()) throw Error("there is no image set to learn from; import or acquire one");
   const bool range = is_range(options_);
@@ -177,7 +177,7 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
     std::vector<std::vector<double>> poses;
     poses.reserve(chosen.size());
     for (const std::size_t i : chosen) poses.push_back(views.at(i).q);
-    PoseGrid grid = find_pose_grid(set.images->workspace(), poses, set.images->object());
+    LearnedGrid grid = find_learned_grid(set.images->workspace(), poses, set.images->object());
     const std::size_t object = objects_.size();
     kinds[object].emplace(set.images->load(chosen[grid.order.front()]));
     objects_.push_back({set.images->object(), set.images->workspace(), std::move(grid.axes), count,
@@ -238,42 +238,42 @@ ViewStore::ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& 
   });
 }
 
-ViewStore::~ViewStore() = default;
+TrainingViews::~TrainingViews() = default;
 
-AppearanceShape ViewStore::shape() const {
+AppearanceShape TrainingViews::shape() const {
   const auto size = static_cast<std::size_t>(options_.size);
   return {size, size, static_cast<std::size_t>(appearance_bands(options_))};
 }
 
-std::vector<std::size_t> ViewStore::groups() const {
+std::vector<std::size_t> TrainingViews::groups() const {
   std::vector<std::size_t> sizes;
   for (const ObjectViews& object : objects_) sizes.push_back(object.count);
   return sizes;
 }
 
-bool ViewStore::has_bytes() const {
+bool TrainingViews::has_bytes() const {
   return appearance_is_picture(options_);
 }
 
-const std::uint8_t* ViewStore::resident_bytes() const {
+const std::uint8_t* TrainingViews::resident_bytes() const {
   return has_bytes() && !on_disk_ ? pictures_.data() : nullptr;
 }
 
-void ViewStore::read_pictures(std::size_t first, std::span<std::uint8_t> bytes) const {
+void TrainingViews::read_pictures(std::size_t first, std::span<std::uint8_t> bytes) const {
   if (on_disk_)
     on_disk_->read(first * picture_bytes_, bytes);
   else
     std::memcpy(bytes.data(), pictures_.data() + first * picture_bytes_, bytes.size());
 }
 
-void ViewStore::write_pictures(std::size_t first, std::span<const std::uint8_t> bytes) {
+void TrainingViews::write_pictures(std::size_t first, std::span<const std::uint8_t> bytes) {
   if (on_disk_)
     on_disk_->write(first * picture_bytes_, bytes);
   else
     std::memcpy(pictures_.data() + first * picture_bytes_, bytes.data(), bytes.size());
 }
 
-void ViewStore::read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const {
+void TrainingViews::read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const {
   AppearanceMaker maker(options_);
   const bool range = is_range(options_);
   std::vector<std::uint8_t> bytes(picture_bytes_);
@@ -288,18 +288,18 @@ void ViewStore::read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const 
   }
 }
 
-void ViewStore::read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const {
+void TrainingViews::read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const {
   read_pictures(first, {tile, n * picture_bytes_});
 }
 
-cv::Mat ViewStore::picture(std::size_t i) const {
+cv::Mat TrainingViews::picture(std::size_t i) const {
   const int type = is_range(options_) ? CV_16UC1 : CV_8UC(picture_bands(options_));
   cv::Mat picture(options_.size, options_.size, type);
   read_pictures(i, {picture.ptr<std::uint8_t>(), picture_bytes_});
   return picture;
 }
 
-std::vector<std::uint8_t> ViewStore::pictures(std::size_t first, std::size_t n) const {
+std::vector<std::uint8_t> TrainingViews::pictures(std::size_t first, std::size_t n) const {
   std::vector<std::uint8_t> bytes(n * picture_bytes_);
   read_pictures(first, bytes);
   return bytes;

@@ -21,13 +21,13 @@
 
 namespace eigenpose {
 
-class KeptViews;  // kept_views.h
+class TrainingArchive;  // kept_views.h
 
 /// What is learned of one object: views of an image set, or those that a former learning kept.
 struct TrainingSet {
   const ImageSet* images = nullptr;
-  std::vector<std::size_t> views;   ///< indices into images->views(); empty means all
-  const KeptViews* kept = nullptr;  ///< else, all views of its object number `kept_object`
+  std::vector<std::size_t> views;         ///< indices into images->views(); empty means all
+  const TrainingArchive* kept = nullptr;  ///< else, all views of its object number `kept_object`
   std::size_t kept_object = 0;
 
   [[nodiscard]] const std::string& object() const;
@@ -35,7 +35,7 @@ struct TrainingSet {
   [[nodiscard]] bool cropped() const;
 };
 
-/// The views of one object inside a ViewStore.
+/// The views of one object inside a TrainingViews.
 struct ObjectViews {
   std::string object;
   Workspace workspace;
@@ -63,15 +63,15 @@ struct ViewStoreOptions {
 ///
 /// Pictures are bytes, range pictures 16 bits a pixel. Where the appearance is the picture, inner products
 /// are exact integers; other types are made anew at each reading.
-class ViewStore final : public AppearanceSource {
+class TrainingViews final : public AppearanceSource {
  public:
   /// Reads, cuts out and normalises every view of `sets`, on all cores.
   /// @throws FileError naming the view (missing, truncated, another size than the first, nothing to be seen
   /// in it); Error when an object has too few views, its poses are no grid, or kept views are normalised in
   /// another way; Interrupted.
-  ViewStore(std::span<const TrainingSet> sets, const ViewStoreOptions& options, const Progress& progress,
-            std::stop_token stop);
-  ~ViewStore() override;
+  TrainingViews(std::span<const TrainingSet> sets, const ViewStoreOptions& options, const Progress& progress,
+                std::stop_token stop);
+  ~TrainingViews() override;
 
   [[nodiscard]] std::span<const ObjectViews> objects() const { return objects_; }
   [[nodiscard]] const NormalizationOptions& normalization() const { return options_; }

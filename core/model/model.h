@@ -33,7 +33,7 @@ struct ModelObject {
   /// change its appearance, or makes it look the same several times a turn.
   bool pose_observable = true;
   /// The object's own eigenspace, where the model was learned with one.
-  std::optional<ObjectSpace> space = std::nullopt;
+  std::optional<ObjectEigenspace> space = std::nullopt;
   std::size_t views = 0;  ///< how many views it was learned from
 };
 

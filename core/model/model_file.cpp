@@ -68,12 +68,13 @@ ModelObject read_object(const Hdf5Group& group) {
     observable.push_back(axis.read_bool("observable"));
   }
   const int degree = static_cast<int>(group.read_integer("degree"));
-  std::optional<ObjectSpace> space;
+  std::optional<ObjectEigenspace> space;
   if (group.has("space")) {
     const Hdf5Group own = group.open_group("space");
-    space = ObjectSpace{read_eigenspace(own),
-                        Manifold::from_coefficients(sample_axes, own.read_doubles("coefficients"), degree),
-                        own.read_bool("better_pose")};
+    space =
+        ObjectEigenspace{read_eigenspace(own),
+                         Manifold::from_coefficients(sample_axes, own.read_doubles("coefficients"), degree),
+                         own.read_bool("better_pose")};
   }
   ModelObject object{
       group.read_text("name"), Workspace(std::move(dofs)),

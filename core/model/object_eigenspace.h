@@ -13,7 +13,7 @@ namespace eigenpose {
 /// Appearances are reduced to at most 32×32, then of unit energy again. The basis spans all views, so that a
 /// point of the manifold stands for the interpolated view itself, and distances are comparable between
 /// objects.
-struct ObjectSpace {
+struct ObjectEigenspace {
   Eigenspace eigenspace;
   Manifold manifold;
   /// Left-out views are found closer to their pose here than in the universal eigenspace.

@@ -117,7 +117,7 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
     object.write("covered_share", parts.calibration[o].covered_share);
     object.write("extents",
                  extents_matrix(o < parts.extents.size() ? parts.extents[o] : std::vector<cv::Size>()));
-    const PoseSpace& pose = parts.poses[o];
+    const AlignmentEigenspace& pose = parts.poses[o];
     object.write("pixel_mean", Eigen::MatrixXf(pose.pixel_mean()));
     write_scale(object.make_group("coarse"), pose.coarse(), pose.coarse_manifold());
     write_scale(object.make_group("fine"), pose.fine(), pose.fine_manifold());
@@ -159,7 +159,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
     parts.extents.push_back(read_extents(object.read_doubles("extents"), parts.objects.back()));
     const Hdf5Group coarse = object.open_group("coarse");
     const Hdf5Group fine = object.open_group("fine");
-    parts.poses.push_back(PoseSpace::from_parts(
+    parts.poses.push_back(AlignmentEigenspace::from_parts(
         read_scale(coarse), read_scale(fine), object.read_floats("pixel_mean"),
         read_manifold(coarse, objects[o].manifold), read_manifold(fine, objects[o].manifold)));
   }

@@ -34,13 +34,13 @@ struct PartsCalibration {
 /// Everything partial matching and alignment know. Immutable once learned; share it between threads.
 struct PartsModel {
   int bands = 1;
-  std::array<float, 3> background{};  ///< root brightness, see CellMapper
+  std::array<float, 3> background{};  ///< root brightness, see OrientationGridMaker
   WindowSpace space;
   WindowScale scale;
   VotingOptions voting;
   double noise = 1e-4;  ///< ν of the alignment: error variance that the splines leave
   std::vector<PartsObject> objects;
-  std::vector<PoseSpace> poses;               ///< one an object
+  std::vector<AlignmentEigenspace> poses;     ///< one an object
   std::vector<PartsCalibration> calibration;  ///< one an object
   /// For each object the size of the region that each learned view was cut out of, pixels; empty where views
   /// came ready-cut. Tells objects apart that touch, as long as the camera stays where it was.

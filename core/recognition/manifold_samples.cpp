@@ -29,7 +29,7 @@ std::vector<double> sample_positions(const SampleAxis& axis, int per_step) {
 
 }  // namespace
 
-PoseTable::PoseTable(const Manifold& manifold) {
+ManifoldSamples::ManifoldSamples(const Manifold& manifold) {
   const int per_step = manifold.dofs() == 1 ? 4 : 1;
   for (const SampleAxis& axis : manifold.axes())
     axes_.push_back({axis.dof, sample_positions(axis, per_step), 1});
@@ -52,7 +52,7 @@ PoseTable::PoseTable(const Manifold& manifold) {
   }
 }
 
-std::size_t PoseTable::nearest_index(const Axis& axis, double value) const {
+std::size_t ManifoldSamples::nearest_index(const Axis& axis, double value) const {
   std::size_t best = 0;
   for (std::size_t i = 1; i < axis.values.size(); ++i)
     if (std::abs(axis.dof.difference(axis.values[i], value)) <
@@ -61,7 +61,7 @@ std::size_t PoseTable::nearest_index(const Axis& axis, double value) const {
   return best;
 }
 
-std::size_t PoseTable::neighbour(std::size_t sample, const Axis& axis, int direction) const {
+std::size_t ManifoldSamples::neighbour(std::size_t sample, const Axis& axis, int direction) const {
   const std::size_t n = axis.values.size();
   const std::size_t at = (sample / axis.stride) % n;
   const std::size_t begin = sample - at * axis.stride;
@@ -70,7 +70,7 @@ std::size_t PoseTable::neighbour(std::size_t sample, const Axis& axis, int direc
   return at + 1 < n ? sample + axis.stride : axis.dof.periodic ? begin : sample;
 }
 
-bool PoseTable::is_minimum(std::size_t sample) const {
+bool ManifoldSamples::is_minimum(std::size_t sample) const {
   const float here = squared_[static_cast<Eigen::Index>(sample)];
   return std::all_of(axes_.begin(), axes_.end(), [&](const Axis& axis) {
     return squared_[static_cast<Eigen::Index>(neighbour(sample, axis, -1))] >= here &&
@@ -78,9 +78,9 @@ bool PoseTable::is_minimum(std::size_t sample) const {
   });
 }
 
-std::optional<PoseTable::Fit> PoseTable::other_minimum(const Eigen::Ref<const Eigen::VectorXf>& point,
-                                                       std::span<const double> q, double apart,
-                                                       std::span<double> other_q) {
+std::optional<ManifoldSamples::Fit> ManifoldSamples::other_minimum(
+    const Eigen::Ref<const Eigen::VectorXf>& point, std::span<const double> q, double apart,
+    std::span<double> other_q) {
   for (Eigen::Index s = 0; s < squared_.size(); ++s) squared_[s] = (points_.col(s) - point).squaredNorm();
   std::optional<Fit> best;
   double best_squared = std::numeric_limits<double>::infinity();
@@ -114,13 +114,13 @@ std::optional<PoseTable::Fit> PoseTable::other_minimum(const Eigen::Ref<const Ei
   return best;
 }
 
-std::vector<double> PoseTable::pose(std::size_t sample) const {
+std::vector<double> ManifoldSamples::pose(std::size_t sample) const {
   std::vector<double> q;
   for (const Axis& axis : axes_) q.push_back(value(sample, axis));
   return q;
 }
 
-std::span<const double> PoseTable::covariance(std::span<const double> q) const {
+std::span<const double> ManifoldSamples::covariance(std::span<const double> q) const {
   std::size_t sample = 0;
   for (std::size_t d = 0; d < axes_.size(); ++d) sample += nearest_index(axes_[d], q[d]) * axes_[d].stride;
   const std::size_t m = axes_.size();

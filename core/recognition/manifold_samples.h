@@ -16,9 +16,9 @@
 namespace eigenpose {
 
 /// Samples of one manifold on a grid. Holds scratch memory: one thread at a time; calls do not allocate.
-class PoseTable {
+class ManifoldSamples {
  public:
-  explicit PoseTable(const Manifold& manifold);
+  explicit ManifoldSamples(const Manifold& manifold);
 
   /// A pose and its distance.
   struct Fit {

@@ -7,7 +7,8 @@
 
 namespace eigenpose {
 
-OwnSpaces::OwnSpaces(const Model& model) : model_(model), searches_(model.objects.size()) {
+ObjectEigenspaceIndex::ObjectEigenspaceIndex(const Model& model)
+    : model_(model), searches_(model.objects.size()) {
   manifolds_.reserve(model.objects.size());  // searches point into it
   const auto side = static_cast<Eigen::Index>(reduced_side(model.normalization));
   reduced_.resize(side * side * appearance_bands(model.normalization));
@@ -23,14 +24,14 @@ OwnSpaces::OwnSpaces(const Model& model) : model_(model), searches_(model.object
   point_.resize(largest);
 }
 
-void OwnSpaces::look(std::span<const float> appearance) {
+void ObjectEigenspaceIndex::look(std::span<const float> appearance) {
   const NormalizationOptions& options = model_.normalization;
   shrink_appearance(appearance, options.size, appearance_bands(options), reduced_side(options),
                     {reduced_.data(), static_cast<std::size_t>(reduced_.size())});
   reduced_.normalize();
 }
 
-ClosestPoint OwnSpaces::closest(std::size_t o) {
+ClosestPoint ObjectEigenspaceIndex::closest(std::size_t o) {
   const Eigenspace& space = model_.objects[o].space->eigenspace;
   centered_ = reduced_ - space.mean;
   auto point = point_.head(space.components());

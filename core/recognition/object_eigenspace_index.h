@@ -16,10 +16,10 @@ namespace eigenpose {
 
 /// Looks at one region after the other. Holds scratch memory: one thread at a time; allocates nothing after
 /// construction.
-class OwnSpaces {
+class ObjectEigenspaceIndex {
  public:
   /// @param model outlives this.
-  explicit OwnSpaces(const Model& model);
+  explicit ObjectEigenspaceIndex(const Model& model);
 
   /// Takes a new region: an appearance of the model's size, of any energy.
   void look(std::span<const float> appearance);

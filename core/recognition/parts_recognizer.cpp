@@ -38,8 +38,8 @@ constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 
 /// Votes of the learned views next to a pose: the best of those within one step in every DOF.
-double votes_near(const std::vector<float>& votes, const PartsObject& object, const PoseSpace& space,
-                  std::span<const double> q) {
+double votes_near(const std::vector<float>& votes, const PartsObject& object,
+                  const AlignmentEigenspace& space, std::span<const double> q) {
   const auto axes = space.coarse_manifold().axes();
   double best = 0.0;
   for (std::size_t c = 0; c < object.candidates.size(); ++c) {
@@ -96,7 +96,7 @@ struct PartsRecognizer::Impl {
 
   const PartsModel& model;
   AlignmentOptions options;
-  CellMapper mapper;
+  OrientationGridMaker mapper;
   PartialMatcher matcher;    ///< of the picture as it is
   PartialMatcher rematcher;  ///< of the picture aligned with one pose
   PoseAligner aligner;
@@ -107,7 +107,7 @@ struct PartsRecognizer::Impl {
   bool numbers_made = false;
   cv::Mat aligned_numbers;
   cv::Mat aligned;
-  CellMap map;
+  OrientationGrid map;
   QueryWindows windows;  ///< of the picture, once they were asked for
   bool windows_made = false;
   QueryWindows aligned_windows;
@@ -125,10 +125,10 @@ struct PartsRecognizer::Impl {
   /// The same of the view with most votes.
   double covered_share(std::size_t object, const std::vector<float>& plain);
   PartsAnswer find_poses(std::size_t object, const std::vector<float>& plain, double covered);
-  CoveredAnswer approach_covered(std::size_t object, const std::vector<float>& plain, double covered);
+  CoveredAnswer approach_occluded(std::size_t object, const std::vector<float>& plain, double covered);
   /// Follows the starts of this merit and more to the end.
-  void refine_covered(CoveredAnswer& found, double hopeless);
-  void identify_covered(std::span<const PartialVote> votes, PartsIdentification& found);
+  void refine_occluded(CoveredAnswer& found, double hopeless);
+  void identify_occluded(std::span<const PartialVote> votes, PartsIdentification& found);
   /// The pose of a candidate, moved by the parabola through its neighbours' votes.
   [[nodiscard]] PoseNumbers voted_pose(std::size_t object, const std::vector<float>& plain,
                                        int candidate) const;
@@ -182,14 +182,16 @@ double PartsRecognizer::Impl::covered_share(std::size_t object, const std::vecto
 
 std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
   // Every window lends its trust to the cells it covers; a pixel has the mean of its cell's windows.
-  constexpr int cells = CellMap::cells;
+  constexpr int cells = OrientationGrid::cells;
   std::array<float, cells * cells> sum{};
   std::array<float, cells * cells> count{};
   for (std::size_t w = 0; w < likeness.size(); ++w) {
     const float trust =
         std::clamp((likeness[w] - foreign_likeness) / (familiar_likeness - foreign_likeness), 0.0F, 1.0F);
-    const int row = static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride - CellMap::pad;
-    const int column = static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride - CellMap::pad;
+    const int row =
+        static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride - OrientationGrid::pad;
+    const int column =
+        static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride - OrientationGrid::pad;
     for (int r = std::max(row, 0); r < std::min(row + WindowGrid::window, cells); ++r) {
       for (int c = std::max(column, 0); c < std::min(column + WindowGrid::window, cells); ++c) {
         sum[static_cast<std::size_t>(r * cells + c)] += trust;
@@ -215,7 +217,7 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
   answer.object = object;
   answer.covered = covered;
   const PartsObject& parts = model.objects[object];
-  const PoseSpace& space = model.poses[object];
+  const AlignmentEigenspace& space = model.poses[object];
   const auto merit = [&](const PartsPose& pose) {
     return window_count * pose.votes - 0.5 * pose.cost / model.noise;
   };
@@ -267,8 +269,8 @@ PoseNumbers PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vec
   return q;
 }
 
-CoveredAnswer PartsRecognizer::Impl::approach_covered(std::size_t object, const std::vector<float>& plain,
-                                                      double covered) {
+CoveredAnswer PartsRecognizer::Impl::approach_occluded(std::size_t object, const std::vector<float>& plain,
+                                                       double covered) {
   const PartsObject& parts = model.objects[object];
   CoveredAnswer found;
   found.answer.object = object;
@@ -303,7 +305,7 @@ CoveredAnswer PartsRecognizer::Impl::approach_covered(std::size_t object, const 
   return found;
 }
 
-void PartsRecognizer::Impl::refine_covered(CoveredAnswer& found, double hopeless) {
+void PartsRecognizer::Impl::refine_occluded(CoveredAnswer& found, double hopeless) {
   PartsAnswer& answer = found.answer;
   masked_aligner.look(posed(), model.poses[answer.object], found.trust);
   for (CoveredStart& start : found.starts) {
@@ -326,10 +328,11 @@ PartsRecognizer::PartsRecognizer(PartsRecognizer&&) noexcept = default;
 PartsRecognizer& PartsRecognizer::operator=(PartsRecognizer&&) noexcept = default;
 
 void PartsRecognizer::look(const cv::Mat& picture) {
-  if (picture.rows == CellMap::pixels) {
+  if (picture.rows == OrientationGrid::pixels) {
     picture.copyTo(impl_->picture);
   } else {
-    cv::resize(picture, impl_->picture, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
+    cv::resize(picture, impl_->picture, cv::Size(OrientationGrid::pixels, OrientationGrid::pixels), 0.0, 0.0,
+               cv::INTER_AREA);
   }
   impl_->windows_made = false;
   impl_->numbers_made = false;
@@ -362,16 +365,17 @@ PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
   const double share = impl.covered_share(object, plain);
   if (!covered && share <= impl.model.calibration[object].covered_share)
     return impl.find_poses(object, plain, share);
-  CoveredAnswer found = impl.approach_covered(object, plain, share);
-  impl.refine_covered(found, found.starts.front().merit - hopeless_merit);
+  CoveredAnswer found = impl.approach_occluded(object, plain, share);
+  impl.refine_occluded(found, found.starts.front().merit - hopeless_merit);
   return found.answer;
 }
 
-void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes, PartsIdentification& found) {
+void PartsRecognizer::Impl::identify_occluded(std::span<const PartialVote> votes,
+                                              PartsIdentification& found) {
   std::vector<CoveredAnswer> rivals;
   const auto approach = [&](const PartialVote& vote) {
     const std::vector<float>& plain = votes_of(vote.object);
-    rivals.push_back(approach_covered(vote.object, plain, covered_share(vote.object, plain)));
+    rivals.push_back(approach_occluded(vote.object, plain, covered_share(vote.object, plain)));
   };
   for (std::size_t i = 0; i < std::min(most_rivals, votes.size()); ++i) {
     if (votes[i].score < rival_votes * votes[0].score) break;
@@ -381,7 +385,7 @@ void PartsRecognizer::Impl::identify_covered(std::span<const PartialVote> votes,
   for (const CoveredAnswer& rival : rivals) most = std::max(most, rival.starts.front().merit);
   double best = -std::numeric_limits<double>::infinity();
   for (CoveredAnswer& rival : rivals) {
-    refine_covered(rival, most - hopeless_merit);
+    refine_occluded(rival, most - hopeless_merit);
     if (!rival.answer.poses.empty()) best = std::max(best, rival.answer.poses.front().merit);
   }
   // A second object is told in any case, as near as it was come to.
@@ -411,7 +415,7 @@ PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> short
   covered = covered || share > impl.model.calibration[first].covered_share;
   PartsIdentification found;
   if (covered) {
-    impl.identify_covered(votes, found);
+    impl.identify_occluded(votes, found);
   } else {
     found.best = impl.find_poses(first, plain, share);
     if (votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);

@@ -43,7 +43,7 @@ bool PartsStage::accepted(const PartsIdentification& found, const RealignedDista
   if (distance.own <= calibration.sure_distance) return true;
   if (distance.own <= calibration.rejection_distance && best.score <= calibration.rejection_score)
     return true;
-  return best.covered > calibration.covered_share && best.covered <= most_covered &&
+  return best.covered > calibration.covered_share && best.covered <= max_occluded_share &&
          found.evidence > model_.parts->covered_evidence;
 }
 

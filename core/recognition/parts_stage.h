@@ -68,7 +68,7 @@ class PartsStage {
   HypothesisPool& pool_;
   PartsRecognizer recognizer_;
   AlignedMatch match_;
-  FusedRegion fused_;
+  TouchingObjects fused_;
   cv::Mat picture_;
   std::vector<PartsPose> poses_;
 };

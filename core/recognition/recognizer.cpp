@@ -73,9 +73,9 @@ struct Recognizer::Impl {
   std::vector<Manifold> manifolds;
   std::unique_ptr<ManifoldSearch> search;
   std::unique_ptr<ManifoldSearch> rejector;  ///< asked first, where there is one
-  OwnSpaces own_spaces;
-  std::vector<PoseTable> poses;  ///< one an object
-  Eigen::VectorXf mean_point;    ///< basisᵀ mean
+  ObjectEigenspaceIndex object_eigenspace_index;
+  std::vector<ManifoldSamples> poses;  ///< one an object
+  Eigen::VectorXf mean_point;          ///< basisᵀ mean
   double search_bound = 0.0;
   std::optional<PartsStage> parts;
 
@@ -130,7 +130,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
       maker(model->normalization),
       manifolds(manifolds_of(*model)),
       search(make_search(options.search, manifolds)),
-      own_spaces(*model),
+      object_eigenspace_index(*model),
       mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
       appearances(model->eigenspace.length(), most_projected),
       points(model->eigenspace.components(), most_projected),
@@ -175,7 +175,9 @@ void Recognizer::Impl::find_closest() {
 }
 
 void Recognizer::Impl::look_again() {
-  const auto has_space = [&](const ClosestPoint& found) { return own_spaces.has(found.manifold); };
+  const auto has_space = [&](const ClosestPoint& found) {
+    return object_eigenspace_index.has(found.manifold);
+  };
   const auto end = closest.begin() + static_cast<std::ptrdiff_t>(closest_count);
   const auto close = std::find_if(closest.begin() + 1, end, [&](const ClosestPoint& found) {
     return found.distance > second_look_ratio * closest[0].distance;
@@ -185,10 +187,11 @@ void Recognizer::Impl::look_again() {
     return model->objects[found.manifold].space->better_pose;
   };
   if (!std::all_of(closest.begin(), close, has_space) || (!doubtful && !better_pose(closest[0]))) return;
-  own_spaces.look(appearance());
+  object_eigenspace_index.look(appearance());
   std::array<ClosestPoint, 3> seen;
   for (auto found = closest.begin(); found != close; ++found)
-    seen[static_cast<std::size_t>(found - closest.begin())] = own_spaces.closest(found->manifold);
+    seen[static_cast<std::size_t>(found - closest.begin())] =
+        object_eigenspace_index.closest(found->manifold);
   const auto count = close - closest.begin();
   const auto winner =
       std::min_element(seen.begin(), seen.begin() + count,

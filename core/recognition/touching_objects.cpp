@@ -52,7 +52,7 @@ bool filled(const cv::Rect& box, const cv::Mat& sums) {
 }
 
 /// The learned view nearest to a pose, in the order of the grid.
-std::size_t nearest_view(const PoseSpace& space, std::span<const double> q) {
+std::size_t nearest_view(const AlignmentEigenspace& space, std::span<const double> q) {
   const auto axes = space.coarse_manifold().axes();
   std::size_t view = 0;
   for (std::size_t a = 0; a < axes.size(); ++a) {
@@ -101,8 +101,8 @@ void keep_different(std::vector<FusedObject>& objects) {
 
 }  // namespace
 
-FusedRegion::FusedRegion(const NormalizationOptions& normalization, const PartsModel& parts,
-                         PartsRecognizer& recognizer)
+TouchingObjects::TouchingObjects(const NormalizationOptions& normalization, const PartsModel& parts,
+                                 PartsRecognizer& recognizer)
     : normalization_(normalization),
       parts_(parts),
       recognizer_(recognizer),
@@ -117,7 +117,7 @@ FusedRegion::FusedRegion(const NormalizationOptions& normalization, const PartsM
   }
 }
 
-void FusedRegion::group_extents(double same) {
+void TouchingObjects::group_extents(double same) {
   for (std::size_t o = 0; o < parts_.extents.size(); ++o) {
     for (const cv::Size& size : parts_.extents[o]) {
       if (size.empty()) continue;  // of an object that came ready-cut
@@ -133,12 +133,12 @@ void FusedRegion::group_extents(double same) {
   }
 }
 
-bool FusedRegion::possible(const cv::Size& region) const {
+bool TouchingObjects::possible(const cv::Size& region) const {
   return !extents_.empty() && region.width >= least_.width && region.height >= least_.height &&
          (region.width >= 1.2 * least_.width || region.height >= 1.2 * least_.height);
 }
 
-bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
+bool TouchingObjects::look(const cv::Rect& box, std::vector<float>& picture) {
   crop_.create(box.size(), work_.type());
   crop_.setTo(background_.color());
   const cv::Rect inside = box & cv::Rect(0, 0, work_.cols, work_.rows);
@@ -152,18 +152,19 @@ bool FusedRegion::look(const cv::Rect& box, std::vector<float>& picture) {
   return true;
 }
 
-cv::Size FusedRegion::learned_size(std::size_t object, std::span<const double> q) const {
+cv::Size TouchingObjects::learned_size(std::size_t object, std::span<const double> q) const {
   return parts_.extents[object][nearest_view(parts_.poses[object], q)];
 }
 
-bool FusedRegion::too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const {
+bool TouchingObjects::too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const {
   if (extents_.empty()) return false;
   const cv::Size learned = learned_size(object, q);
   return !learned.empty() &&
          (region.width > doubtful_size * learned.width || region.height > doubtful_size * learned.height);
 }
 
-std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline, double visible, Places places) {
+std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outline, double visible,
+                                                            Places places) {
   std::vector<Trial> all;
   std::vector<float> picture;
   cv::Mat sums;
@@ -201,7 +202,7 @@ std::vector<FusedRegion::Trial> FusedRegion::trials(const cv::Rect& outline, dou
   return all;
 }
 
-FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
+FusedObject TouchingObjects::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
   FusedObject object{box, {}, {}};
   if (!look(box, object.picture)) return object;
   object.found = recognizer_.identify(shortlist, true);
@@ -218,7 +219,7 @@ FusedObject FusedRegion::settle(const cv::Rect& box, std::span<const std::size_t
   return object;
 }
 
-std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double visible) {
+std::vector<FusedObject> TouchingObjects::candidates(const cv::Rect& outline, double visible) {
   for (const Places places : {Places::corners, Places::all}) {
     std::vector<FusedObject> found = candidates(trials(outline, visible, places));
     if (!found.empty()) return found;
@@ -226,7 +227,7 @@ std::vector<FusedObject> FusedRegion::candidates(const cv::Rect& outline, double
   return {};
 }
 
-std::vector<FusedObject> FusedRegion::candidates(std::span<const Trial> trials) {
+std::vector<FusedObject> TouchingObjects::candidates(std::span<const Trial> trials) {
   std::vector<FusedObject> found;
   for (const Trial& trial : trials) {
     FusedObject object = settle(trial.box, extents_[trial.extent].objects);
@@ -252,8 +253,8 @@ std::vector<FusedObject> FusedRegion::candidates(std::span<const Trial> trials) 
   return found;
 }
 
-cv::Mat FusedRegion::silhouette(const FusedObject& object) const {
-  const PoseSpace& space = parts_.poses[object.found.best.object];
+cv::Mat TouchingObjects::silhouette(const FusedObject& object) const {
+  const AlignmentEigenspace& space = parts_.poses[object.found.best.object];
   const int side = space.coarse().side;
   Eigen::VectorXf pixels;
   space.render(object.found.best.poses.front().q, pixels);
@@ -271,7 +272,7 @@ cv::Mat FusedRegion::silhouette(const FusedObject& object) const {
   return out;
 }
 
-double FusedRegion::complete(FusedObject first, const cv::Mat& foreground, TakenApart& way) {
+double TouchingObjects::complete(FusedObject first, const cv::Mat& foreground, TakenApart& way) {
   const double whole = cv::countNonZero(foreground);
   cv::Mat left = foreground.clone();
   way.objects.clear();
@@ -294,7 +295,7 @@ double FusedRegion::complete(FusedObject first, const cv::Mat& foreground, Taken
   }
 }
 
-const TakenApart& FusedRegion::take_apart(const cv::Mat& cut, const Background& background) {
+const TakenApart& TouchingObjects::take_apart(const cv::Mat& cut, const Background& background) {
   background_ = background;
   looks_left_ = most_looks;
   result_ = {};

@@ -33,11 +33,11 @@ struct TakenApart {
 };
 
 /// Takes fused regions apart. Holds scratch memory: one thread at a time.
-class FusedRegion {
+class TouchingObjects {
  public:
   /// Both outlive it. @param recognizer of the model's parts.
-  FusedRegion(const NormalizationOptions& normalization, const PartsModel& parts,
-              PartsRecognizer& recognizer);
+  TouchingObjects(const NormalizationOptions& normalization, const PartsModel& parts,
+                  PartsRecognizer& recognizer);
 
   /// An object in this pose was learned so much smaller that the region may show another beside it.
   [[nodiscard]] bool too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const;

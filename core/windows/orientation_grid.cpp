@@ -32,11 +32,11 @@ struct Share {
   float weight = 0.0F;
 };
 
-const std::array<Share, CellMap::pixels>& shares() {
-  static const std::array<Share, CellMap::pixels> table = [] {
-    std::array<Share, CellMap::pixels> made{};
-    for (int p = 0; p < CellMap::pixels; ++p) {
-      const float position = (static_cast<float>(p) + 0.5F) / CellMap::cell - 0.5F;
+const std::array<Share, OrientationGrid::pixels>& shares() {
+  static const std::array<Share, OrientationGrid::pixels> table = [] {
+    std::array<Share, OrientationGrid::pixels> made{};
+    for (int p = 0; p < OrientationGrid::pixels; ++p) {
+      const float position = (static_cast<float>(p) + 0.5F) / OrientationGrid::cell - 0.5F;
       const float first = std::floor(position);
       made[static_cast<std::size_t>(p)] = {static_cast<int>(first), 1.0F - (position - first)};
     }
@@ -59,19 +59,19 @@ inline float orientation_in_bins(float x, float y) {
   angle = ay > ax ? 0.5F * pi - angle : angle;
   angle = x < 0.0F ? pi - angle : angle;
   angle = y < 0.0F ? 2.0F * pi - angle : angle;
-  return angle * (static_cast<float>(CellMap::bins) / (2.0F * pi));
+  return angle * (static_cast<float>(OrientationGrid::bins) / (2.0F * pi));
 }
 
 /// A row of gradients: of the strongest band, as orientation and magnitude.
 struct GradientRow {
-  std::array<float, CellMap::pixels> place{};      ///< orientation in bins, 0…8
-  std::array<float, CellMap::pixels> magnitude{};  ///< of the Sobel gradient, /8
+  std::array<float, OrientationGrid::pixels> place{};      ///< orientation in bins, 0…8
+  std::array<float, OrientationGrid::pixels> magnitude{};  ///< of the Sobel gradient, /8
 };
 
 /// @param above, here, below rows of root brightness that begin one pixel before the first, borders repeated.
 template <int Bands>
 void find_gradients(const float* above, const float* here, const float* below, GradientRow& row) {
-  for (std::size_t c = 0; c < CellMap::pixels; ++c) {
+  for (std::size_t c = 0; c < OrientationGrid::pixels; ++c) {
     const std::size_t left = c * Bands;
     float gx = 0.0F;
     float gy = 0.0F;
@@ -97,19 +97,19 @@ void find_gradients(const float* above, const float* here, const float* below, G
 /// One row of pixels between the columns of cells; the first and the last place lie outside.
 template <int Bands>
 struct RowSums {
-  static constexpr std::size_t places = CellMap::cells + 2;
-  std::array<float, places * CellMap::bins> orientation{};
+  static constexpr std::size_t places = OrientationGrid::cells + 2;
+  std::array<float, places * OrientationGrid::bins> orientation{};
   std::array<float, places * Bands> brightness{};
 };
 
 template <int Bands>
-void fill(const std::vector<float>& root, CellMap& map) {
-  constexpr int n = CellMap::pixels;
-  constexpr std::size_t bins = CellMap::bins;
-  constexpr std::size_t cells = CellMap::cells;
+void fill(const std::vector<float>& root, OrientationGrid& map) {
+  constexpr int n = OrientationGrid::pixels;
+  constexpr std::size_t bins = OrientationGrid::bins;
+  constexpr std::size_t cells = OrientationGrid::cells;
   constexpr std::ptrdiff_t stride = std::ptrdiff_t{n + 2} * Bands;
   // Pixels outside have no share in a cell; a cell weight sums to 1 over its 8×8 pixels.
-  constexpr float norm = 1.0F / (CellMap::cell * CellMap::cell);
+  constexpr float norm = 1.0F / (OrientationGrid::cell * OrientationGrid::cell);
   const auto& share = shares();
   GradientRow gradients;
   for (int r = 0; r < n; ++r) {
@@ -141,8 +141,9 @@ void fill(const std::vector<float>& root, CellMap& map) {
     const Share row = share[static_cast<std::size_t>(r)];
     for (const auto& [cell_row, weight] :
          {std::pair(row.first, row.weight), {row.first + 1, 1.0F - row.weight}}) {
-      if (cell_row < 0 || cell_row >= CellMap::cells) continue;
-      const auto at = static_cast<std::size_t>((cell_row + CellMap::pad) * CellMap::side + CellMap::pad);
+      if (cell_row < 0 || cell_row >= OrientationGrid::cells) continue;
+      const auto at = static_cast<std::size_t>((cell_row + OrientationGrid::pad) * OrientationGrid::side +
+                                               OrientationGrid::pad);
       for (std::size_t i = 0; i < cells * bins; ++i)
         map.orientation[at * bins + i] += weight * sums.orientation[bins + i];
       for (std::size_t i = 0; i < cells * Bands; ++i)
@@ -153,7 +154,7 @@ void fill(const std::vector<float>& root, CellMap& map) {
 
 }  // namespace
 
-void CellMapper::compute(const cv::Mat& picture, CellMap& map) {
+void OrientationGridMaker::compute(const cv::Mat& picture, OrientationGrid& map) {
   if ((picture.type() != CV_8UC1 && picture.type() != CV_8UC3) || picture.rows != picture.cols ||
       picture.empty()) {
     throw std::invalid_argument("a cell map is made of a square 8-bit picture of 1 or 3 bands, not of " +
@@ -161,17 +162,18 @@ void CellMapper::compute(const cv::Mat& picture, CellMap& map) {
                                 " of OpenCV type " + std::to_string(picture.type()));
   }
   const cv::Mat* source = &picture;
-  if (picture.rows != CellMap::pixels) {
-    cv::resize(picture, resized_, cv::Size(CellMap::pixels, CellMap::pixels), 0.0, 0.0, cv::INTER_AREA);
+  if (picture.rows != OrientationGrid::pixels) {
+    cv::resize(picture, resized_, cv::Size(OrientationGrid::pixels, OrientationGrid::pixels), 0.0, 0.0,
+               cv::INTER_AREA);
     source = &resized_;
   }
   const int bands = source->channels();
   // One pixel more on either side, which repeats the border.
   const auto band_count = static_cast<std::size_t>(bands);
-  const std::size_t row_length = CellMap::pixels * band_count;
-  root_.resize((row_length + 2 * band_count) * CellMap::pixels);
+  const std::size_t row_length = OrientationGrid::pixels * band_count;
+  root_.resize((row_length + 2 * band_count) * OrientationGrid::pixels);
   const auto& table = root_table();
-  for (int r = 0; r < CellMap::pixels; ++r) {
+  for (int r = 0; r < OrientationGrid::pixels; ++r) {
     const std::uint8_t* bytes = source->ptr<std::uint8_t>(r);
     float* out = root_.data() + static_cast<std::size_t>(r) * (row_length + 2 * band_count) + band_count;
     for (std::size_t i = 0; i < row_length; ++i) {
@@ -180,9 +182,9 @@ void CellMapper::compute(const cv::Mat& picture, CellMap& map) {
     std::copy_n(out, band_count, out - band_count);
     std::copy_n(out + row_length - band_count, band_count, out + row_length);
   }
-  constexpr auto places = static_cast<std::size_t>(CellMap::side) * CellMap::side;
+  constexpr auto places = static_cast<std::size_t>(OrientationGrid::side) * OrientationGrid::side;
   map.bands = bands;
-  map.orientation.assign(places * CellMap::bins, 0.0F);
+  map.orientation.assign(places * OrientationGrid::bins, 0.0F);
   map.brightness.assign(places * static_cast<std::size_t>(bands), 0.0F);
   if (bands == 1) {
     fill<1>(root_, map);
@@ -192,10 +194,11 @@ void CellMapper::compute(const cv::Mat& picture, CellMap& map) {
   take_off(background_, map);
 }
 
-void take_off(const std::array<float, 3>& background, CellMap& map) {
-  for (int r = CellMap::pad; r < CellMap::pad + CellMap::cells; ++r) {
-    for (int c = CellMap::pad; c < CellMap::pad + CellMap::cells; ++c) {
-      float* values = map.brightness.data() + static_cast<std::size_t>((r * CellMap::side + c) * map.bands);
+void take_off(const std::array<float, 3>& background, OrientationGrid& map) {
+  for (int r = OrientationGrid::pad; r < OrientationGrid::pad + OrientationGrid::cells; ++r) {
+    for (int c = OrientationGrid::pad; c < OrientationGrid::pad + OrientationGrid::cells; ++c) {
+      float* values =
+          map.brightness.data() + static_cast<std::size_t>((r * OrientationGrid::side + c) * map.bands);
       for (int b = 0; b < map.bands; ++b) {
         values[b] = std::max(0.0F, values[b] - background[static_cast<std::size_t>(b)]);
       }
@@ -203,17 +206,17 @@ void take_off(const std::array<float, 3>& background, CellMap& map) {
   }
 }
 
-std::array<float, 3> background_level(const std::vector<CellMap>& maps) {
+std::array<float, 3> background_level(const std::vector<OrientationGrid>& maps) {
   std::array<float, 3> level{};
   if (maps.empty()) {
     return level;
   }
-  constexpr int first = CellMap::pad;
-  constexpr int last = CellMap::pad + CellMap::cells - 1;
+  constexpr int first = OrientationGrid::pad;
+  constexpr int last = OrientationGrid::pad + OrientationGrid::cells - 1;
   for (int b = 0; b < maps.front().bands; ++b) {
     std::vector<float> corners;
     corners.reserve(maps.size() * 4);
-    for (const CellMap& map : maps) {
+    for (const OrientationGrid& map : maps) {
       for (const int r : {first, last}) {
         for (const int c : {first, last}) {
           corners.push_back(map.brightness_at(r, c)[b]);

@@ -15,7 +15,7 @@
 namespace eigenpose {
 
 /// The map of one region, with a frame of `pad` zero cells around it so that windows may hang over the edge.
-struct CellMap {
+struct OrientationGrid {
   static constexpr int pixels = 64;             ///< side of the picture the map is made of
   static constexpr int cell = 4;                ///< side of a cell, pixels
   static constexpr int cells = pixels / cell;   ///< 16 cells a side
@@ -37,15 +37,16 @@ struct CellMap {
 };
 
 /// Makes cell maps. Holds scratch memory: one thread at a time.
-class CellMapper {
+class OrientationGridMaker {
  public:
   /// @param background root brightness (0…1) that is taken off each band.
-  explicit CellMapper(std::array<float, 3> background = {0.0F, 0.0F, 0.0F}) : background_(background) {}
+  explicit OrientationGridMaker(std::array<float, 3> background = {0.0F, 0.0F, 0.0F})
+      : background_(background) {}
 
   /// Fills `map` from a square CV_8UC1 or CV_8UC3 picture of any size (resized by area to 64×64).
   /// Allocates only when `map` or the picture change their kind. @throws std::invalid_argument for other
   /// pictures.
-  void compute(const cv::Mat& picture, CellMap& map);
+  void compute(const cv::Mat& picture, OrientationGrid& map);
 
  private:
   std::array<float, 3> background_;
@@ -54,10 +55,10 @@ class CellMapper {
 };
 
 /// Takes root brightness off each band, down to 0, as if `map` had been made with this background.
-void take_off(const std::array<float, 3>& background, CellMap& map);
+void take_off(const std::array<float, 3>& background, OrientationGrid& map);
 
 /// The median over `maps` (made with no background) of the root brightness of the four corner cells, per
 /// band.
-std::array<float, 3> background_level(const std::vector<CellMap>& maps);
+std::array<float, 3> background_level(const std::vector<OrientationGrid>& maps);
 
 }  // namespace eigenpose

@@ -35,7 +35,7 @@ std::int32_t largest(const std::int32_t* numbers, std::size_t count) {
 
 }  // namespace
 
-void make_query_windows(const CellMap& map, const WindowSpace& space, const WindowScale& scale,
+void make_query_windows(const OrientationGrid& map, const WindowSpace& space, const WindowScale& scale,
                         const VotingOptions& options, QueryWindows& out) {
   thread_local Eigen::MatrixXf coordinates;
   space.project(map, QueryWindows::stride, coordinates, &out.weights);

@@ -100,7 +100,7 @@ class PartialMatcher {
 };
 
 /// Projects and quantises the windows of a map.
-void make_query_windows(const CellMap& map, const WindowSpace& space, const WindowScale& scale,
+void make_query_windows(const OrientationGrid& map, const WindowSpace& space, const WindowScale& scale,
                         const VotingOptions& options, QueryWindows& out);
 
 }  // namespace eigenpose

@@ -19,27 +19,27 @@ constexpr float chroma_weight = 4.0F;  // colour against brightness
 
 }  // namespace
 
-float window_vector(const CellMap& map, int row, int column, float* out) {
+float window_vector(const OrientationGrid& map, int row, int column, float* out) {
   constexpr int n = WindowGrid::window;
   constexpr int cells = n * n;
   float mass = 0.0F;
   float* orientation = out;
   for (int r = 0; r < n; ++r) {
     const float* source = map.orientation_at(row + r, column);
-    for (int i = 0; i < n * CellMap::bins; ++i) {
+    for (int i = 0; i < n * OrientationGrid::bins; ++i) {
       mass += source[i];
-      orientation[r * n * CellMap::bins + i] = source[i];
+      orientation[r * n * OrientationGrid::bins + i] = source[i];
     }
   }
   const float scale = 1.0F / (mass + soft_mass);
-  for (int i = 0; i < cells * CellMap::bins; ++i) {
+  for (int i = 0; i < cells * OrientationGrid::bins; ++i) {
     orientation[i] = std::sqrt(orientation[i] * scale);
   }
 
   const int bands = map.bands;
   const float per_band = 1.0F / static_cast<float>(bands);
   float energy = 0.0F;
-  float* level = out + cells * CellMap::bins;
+  float* level = out + cells * OrientationGrid::bins;
   float* chroma = level + cells;
   const float weight = chroma_weight / std::sqrt(static_cast<float>(bands));
   for (int r = 0; r < n; ++r) {
@@ -60,14 +60,15 @@ float window_vector(const CellMap& map, int row, int column, float* out) {
     }
   }
   const float divisor = 1.0F / std::sqrt(energy * per_band + soft_energy * soft_energy);
-  const int rest = window_length(bands) - cells * CellMap::bins;
+  const int rest = window_length(bands) - cells * OrientationGrid::bins;
   for (int i = 0; i < rest; ++i) {
     level[i] *= divisor;
   }
   return mass;
 }
 
-WindowSpace WindowSpace::learn(const std::vector<CellMap>& maps, unsigned threads, std::size_t limit) {
+WindowSpace WindowSpace::learn(const std::vector<OrientationGrid>& maps, unsigned threads,
+                               std::size_t limit) {
   if (maps.empty()) {
     throw std::invalid_argument("a window eigenspace needs at least one cell map, got none");
   }
@@ -140,7 +141,7 @@ WindowSpace WindowSpace::from_parts(Eigen::VectorXf mean, Eigen::MatrixXf basis,
   return space;
 }
 
-void WindowSpace::project(const CellMap& map, int stride, Eigen::MatrixXf& out,
+void WindowSpace::project(const OrientationGrid& map, int stride, Eigen::MatrixXf& out,
                           std::vector<float>* masses) const {
   const int per_side = (WindowGrid::side - 1) / stride + 1;
   const int count = per_side * per_side;

@@ -18,21 +18,21 @@ namespace eigenpose {
 
 /// Sizes of the window grid.
 struct WindowGrid {
-  static constexpr int window = 4;                         ///< side of a window, cells
-  static constexpr int side = CellMap::side - window + 1;  ///< 17 positions a side
-  static constexpr int positions = side * side;            ///< 289
-  static constexpr int components = 32;                    ///< K of the window eigenspace
+  static constexpr int window = 4;                                 ///< side of a window, cells
+  static constexpr int side = OrientationGrid::side - window + 1;  ///< 17 positions a side
+  static constexpr int positions = side * side;                    ///< 289
+  static constexpr int components = 32;                            ///< K of the window eigenspace
 };
 
 /// Length of a window's vector: 128 + 16 (grey) or 128 + 16 + 48 (colour).
 [[nodiscard]] constexpr int window_length(int bands) {
   const int cells = WindowGrid::window * WindowGrid::window;
-  return cells * CellMap::bins + cells + (bands > 1 ? cells * bands : 0);
+  return cells * OrientationGrid::bins + cells + (bands > 1 ? cells * bands : 0);
 }
 
 /// Writes the vector of the window whose upper left cell is (row, column), 0…16 each.
 /// @return its gradient mass (sum of the orientation part), which says how much there is to see.
-float window_vector(const CellMap& map, int row, int column, float* out);
+float window_vector(const OrientationGrid& map, int row, int column, float* out);
 
 /// Mean and basis of all windows.
 class WindowSpace {
@@ -40,7 +40,8 @@ class WindowSpace {
   WindowSpace() = default;
   /// The eigenspace of the windows of `maps`: at most `limit` of them, evenly spread, taken from those whose
   /// gradient mass is above the 30 % quantile. @throws std::invalid_argument without maps.
-  static WindowSpace learn(const std::vector<CellMap>& maps, unsigned threads = 0, std::size_t limit = 30000);
+  static WindowSpace learn(const std::vector<OrientationGrid>& maps, unsigned threads = 0,
+                           std::size_t limit = 30000);
   /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
   static WindowSpace from_parts(Eigen::VectorXf mean, Eigen::MatrixXf basis, float mean_mass);
 
@@ -53,7 +54,8 @@ class WindowSpace {
   /// Projects the windows at (row, column), both running over 0, stride, 2·stride … 16.
   /// @param out one column of 32 numbers a window, row by row. @param masses gradient masses of the same, or
   /// nullptr.
-  void project(const CellMap& map, int stride, Eigen::MatrixXf& out, std::vector<float>* masses) const;
+  void project(const OrientationGrid& map, int stride, Eigen::MatrixXf& out,
+               std::vector<float>* masses) const;
 
  private:
   Eigen::VectorXf mean_;

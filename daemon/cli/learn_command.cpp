@@ -94,7 +94,7 @@ std::filesystem::path views_file(const std::string& model) {
 /// What a model is learned from, and how.
 struct Lesson {
   std::vector<ImageSet> images;
-  std::unique_ptr<KeptViews> kept;
+  std::unique_ptr<TrainingArchive> kept;
   std::vector<TrainingSet> sets;
   LearningOptions options;
 };
@@ -114,7 +114,7 @@ Lesson next_lesson(const LearnOptions& options) {
     throw ConfigError("--update: name a folder of image sets that join, or objects that leave with --remove");
   Lesson lesson;
   const Model former = load_model(options.update);
-  lesson.kept = std::make_unique<KeptViews>(views_file(options.update));
+  lesson.kept = std::make_unique<TrainingArchive>(views_file(options.update));
   if (!lesson.kept->belong_to(former))
     throw FileError(lesson.kept->file(),
                     "does not belong to " + options.update +

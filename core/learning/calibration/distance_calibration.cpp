@@ -53,7 +53,7 @@ cv::Mat moved(const cv::Mat& view, const RejectionOptions& options, std::mt19937
 }
 
 /// Distances of moved views of one object to its manifold.
-std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& object,
+std::vector<double> moved_distances(const TrainingViews& views, const ObjectViews& object,
                                     const Eigenspace& eigenspace, const ManifoldSearch& search,
                                     const RejectionOptions& options, std::uint32_t seed) {
   const std::size_t copies = std::clamp<std::size_t>(most_moved / views.count(), 1, options.moved_views);
@@ -81,7 +81,7 @@ std::vector<double> moved_distances(const ViewStore& views, const ObjectViews& o
 
 }  // namespace
 
-std::vector<RejectionEvidence> measure_rejection(const ViewStore& views, const Eigenspace& eigenspace,
+std::vector<RejectionEvidence> measure_rejection(const TrainingViews& views, const Eigenspace& eigenspace,
                                                  const Eigen::MatrixXd& points,
                                                  std::span<const Manifold> manifolds,
                                                  const RejectionOptions& options, const Progress& progress,

@@ -44,7 +44,7 @@ struct RejectionEvidence {
 
 /// @param points K × M projections of the store's views.
 /// @param manifolds one an object of the store, in the same order.
-std::vector<RejectionEvidence> measure_rejection(const ViewStore& views, const Eigenspace& eigenspace,
+std::vector<RejectionEvidence> measure_rejection(const TrainingViews& views, const Eigenspace& eigenspace,
                                                  const Eigen::MatrixXd& points,
                                                  std::span<const Manifold> manifolds,
                                                  const RejectionOptions& options, const Progress& progress,

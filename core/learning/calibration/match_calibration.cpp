@@ -134,9 +134,10 @@ Misalignment random_misalignment(const MatchCalibrationOptions& options, std::mt
 }
 
 /// Moves, aligns and measures every view of one object.
-std::vector<Probe> probe_object(const Model& model, const ViewStore& views, const Eigen::MatrixXd& all_points,
-                                std::size_t o, const ManifoldSearch& search,
-                                const MatchCalibrationOptions& options, std::size_t copies) {
+std::vector<Probe> probe_object(const Model& model, const TrainingViews& views,
+                                const Eigen::MatrixXd& all_points, std::size_t o,
+                                const ManifoldSearch& search, const MatchCalibrationOptions& options,
+                                std::size_t copies) {
   const ObjectViews& object = views.objects()[o];
   const Eigen::MatrixXd points =
       all_points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count));
@@ -283,7 +284,7 @@ double exceeded_by(const MatchEvidence& own, const std::vector<double>& factors,
 
 }  // namespace
 
-std::vector<MatchEvidence> measure_match(const Model& model, const ViewStore& views,
+std::vector<MatchEvidence> measure_match(const Model& model, const TrainingViews& views,
                                          const Eigen::MatrixXd& points,
                                          const MatchCalibrationOptions& options, const Progress& progress,
                                          std::stop_token stop) {

@@ -56,7 +56,7 @@ struct MatchThresholds {
 /// Moves, aligns and measures all views. @param model with parts and manifolds, its thresholds not yet set.
 /// @param points K × M projections of the store's views. @throws std::invalid_argument for options out of
 /// range; Interrupted.
-std::vector<MatchEvidence> measure_match(const Model& model, const ViewStore& views,
+std::vector<MatchEvidence> measure_match(const Model& model, const TrainingViews& views,
                                          const Eigen::MatrixXd& points,
                                          const MatchCalibrationOptions& options, const Progress& progress,
                                          std::stop_token stop);

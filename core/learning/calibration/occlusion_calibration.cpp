@@ -24,9 +24,10 @@ constexpr double hidden_share = 0.2;
 
 }  // namespace
 
-std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std::vector<PartsViews>& objects,
-                                             const CoveredCalibrationOptions& options,
-                                             const Progress& progress, std::stop_token stop) {
+std::vector<OcclusionEvidence> measure_occlusion(const PartsModel& model,
+                                                 const std::vector<PartsViews>& objects,
+                                                 const OcclusionCalibrationOptions& options,
+                                                 const Progress& progress, std::stop_token stop) {
   if (objects.size() < 2) return {};
   struct View {
     std::size_t object;
@@ -36,7 +37,7 @@ std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std:
   for (std::size_t o = 0; o < objects.size(); ++o)
     for (std::size_t v = 0; v < objects[o].count; ++v) all.push_back({o, v});
   const std::size_t shown = std::min(options.views, all.size());
-  std::vector<CoveredEvidence> result(shown);
+  std::vector<OcclusionEvidence> result(shown);
   constexpr std::size_t batch = 16;
   std::atomic<std::size_t> done = 0;
   parallel_for((shown + batch - 1) / batch, options.threads, [&](std::size_t b) {
@@ -62,7 +63,7 @@ std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std:
         recognizer.look(picture);
         const PartsIdentification found = recognizer.identify(others);
         if (found.best.covered > model.calibration[found.best.object].covered_share &&
-            found.best.covered <= most_covered && found.evidence > result[i].evidence)
+            found.best.covered <= max_occluded_share && found.evidence > result[i].evidence)
           result[i] = {view.object, found.best.object, found.evidence};
       }
     }
@@ -72,10 +73,10 @@ std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std:
   return result;
 }
 
-double covered_threshold(std::span<const CoveredEvidence> strangers, double stranger_rate,
-                         std::optional<std::size_t> without) {
+double occlusion_threshold(std::span<const OcclusionEvidence> strangers, double stranger_rate,
+                           std::optional<std::size_t> without) {
   std::vector<double> evidence;
-  for (const CoveredEvidence& shown : strangers)
+  for (const OcclusionEvidence& shown : strangers)
     if (shown.stranger != without && shown.taken_for != without) evidence.push_back(shown.evidence);
   if (evidence.empty()) return std::numeric_limits<double>::infinity();
   std::sort(evidence.begin(), evidence.end(), std::greater<>());

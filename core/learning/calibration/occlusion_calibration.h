@@ -15,26 +15,27 @@
 namespace eigenpose {
 
 /// What one learned view showed as a stranger.
-struct CoveredEvidence {
+struct OcclusionEvidence {
   std::size_t stranger = 0;   ///< the object it shows
   std::size_t taken_for = 0;  ///< the object it was taken for
   double evidence = 0.0;  ///< see PartsIdentification; −∞ where it would not be taken for a covered object
 };
 
-struct CoveredCalibrationOptions {
+struct OcclusionCalibrationOptions {
   std::size_t views = 200;  ///< learned views that are shown, evenly spread
   unsigned threads = 0;
 };
 
 /// Shows learned views as strangers. Empty for a model of one object. @throws Interrupted.
-std::vector<CoveredEvidence> measure_covered(const PartsModel& model, const std::vector<PartsViews>& objects,
-                                             const CoveredCalibrationOptions& options,
-                                             const Progress& progress = {}, std::stop_token stop = {});
+std::vector<OcclusionEvidence> measure_occlusion(const PartsModel& model,
+                                                 const std::vector<PartsViews>& objects,
+                                                 const OcclusionCalibrationOptions& options,
+                                                 const Progress& progress = {}, std::stop_token stop = {});
 
 /// The evidence that at most a share `stranger_rate` of them exceeds, and no less than is ever enough; +∞
 /// where there are none.
 /// @param without this object's views, and what was taken for it, do not count.
-double covered_threshold(std::span<const CoveredEvidence> strangers, double stranger_rate,
-                         std::optional<std::size_t> without = {});
+double occlusion_threshold(std::span<const OcclusionEvidence> strangers, double stranger_rate,
+                           std::optional<std::size_t> without = {});
 
 }  // namespace eigenpose

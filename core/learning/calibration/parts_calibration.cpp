@@ -50,9 +50,9 @@ cv::Mat moved(const cv::Mat& picture, const PartsCalibrationOptions& options, st
 
 Scores score_views(const PartsModel& model, std::size_t object, const PartsViews& views,
                    const PartsCalibrationOptions& options, std::size_t stride) {
-  CellMapper mapper(model.background);
+  OrientationGridMaker mapper(model.background);
   PartialMatcher matcher(model.objects, model.scale, model.voting);
-  CellMap map;
+  OrientationGrid map;
   QueryWindows windows;
   std::vector<float> votes;
   std::vector<float> likeness;

@@ -8,11 +8,11 @@
 namespace eigenpose {
 namespace {
 
-PoseSpace learn(const test::DrawnObject& object, double step) {
+AlignmentEigenspace learn(const test::DrawnObject& object, double step) {
   const PartsViews views = test::turntable_views(object, step);
   std::vector<PosePicture> pictures(views.count);
   for (std::size_t i = 0; i < views.count; ++i) make_pose_picture(views.view(i), pictures[i]);
-  return PoseSpace::learn(views.axes, pictures);
+  return AlignmentEigenspace::learn(views.axes, pictures);
 }
 
 TEST(PoseScale, HasTheDerivativesOfItsWarp) {
@@ -41,7 +41,7 @@ TEST(PoseScale, HasTheDerivativesOfItsWarp) {
 
 TEST(PoseAligner, FindsThePoseBetweenLearnedViews) {
   const test::DrawnObject object(7);
-  const PoseSpace space = learn(object, 10.0);
+  const AlignmentEigenspace space = learn(object, 10.0);
   PoseAligner aligner({});
   for (const double truth : {5.0, 123.0, 358.0}) {
     PosePicture picture;
@@ -52,7 +52,7 @@ TEST(PoseAligner, FindsThePoseBetweenLearnedViews) {
 
 TEST(PoseAligner, IsNotMisledByShiftAndScale) {
   const test::DrawnObject object(8);
-  const PoseSpace space = learn(object, 10.0);
+  const AlignmentEigenspace space = learn(object, 10.0);
   PoseAligner aligner({});
   for (const double truth : {15.0, 216.0}) {
     PosePicture picture;

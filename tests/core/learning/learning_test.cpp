@@ -75,7 +75,7 @@ TEST_F(Learning, GivesTheSameModelFromMemoryAndFromDisk) {
   options.memory_limit = 90 * picture_length(options.normalization);
   options.scratch_folder = root();
   EXPECT_EQ(
-      ViewStore(all_views(sets), {options.normalization, 1, options.memory_limit / 2}, {}, {}).resident(),
+      TrainingViews(all_views(sets), {options.normalization, 1, options.memory_limit / 2}, {}, {}).resident(),
       0U);
   const Model disk = learn(all_views(sets), options);
   EXPECT_EQ(disk.eigenspace.basis, memory.eigenspace.basis);
@@ -105,8 +105,8 @@ TEST_F(Learning, ReadsViewsOfEveryTypeAlikeFromMemoryAndFromDisk) {
   NormalizationOptions options = testing::small_learning().normalization;
   for (const std::string type : {"grey", "color", "gradient", "color+fourier"}) {
     set_image_type(options, type);
-    const ViewStore memory(all_views(sets), {options, 2}, {}, {});
-    const ViewStore disk(all_views(sets), {options, 2, 1, root()}, {}, {});
+    const TrainingViews memory(all_views(sets), {options, 2}, {}, {});
+    const TrainingViews disk(all_views(sets), {options, 2, 1, root()}, {}, {});
     ASSERT_EQ(disk.resident(), 0U);
     const auto rows = static_cast<Eigen::Index>(appearance_length(options));
     Eigen::MatrixXf a(rows, 4);

@@ -18,7 +18,7 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-class KeptViewsTest : public ::testing::Test {
+class TrainingArchiveTest : public ::testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path path(const std::string& name) const { return folder_.path() / name; }
   [[nodiscard]] std::filesystem::path sets() const { return path("sets"); }
@@ -45,18 +45,18 @@ class KeptViewsTest : public ::testing::Test {
                                                    const std::vector<std::string>& leaving,
                                                    const std::vector<ImageSet>& joining,
                                                    LearningOptions options) const {
-    const KeptViews kept(path(file));
+    const TrainingArchive kept(path(file));
     options.program_version = testing::small_learning().program_version;
     return bytes_of(learn(updated_sets(kept, leaving, joining), options));
   }
   [[nodiscard]] std::vector<unsigned char> updated(const std::string& file,
                                                    const std::vector<std::string>& leaving,
                                                    const std::vector<ImageSet>& joining = {}) const {
-    return updated(file, leaving, joining, KeptViews(path(file)).options());
+    return updated(file, leaving, joining, TrainingArchive(path(file)).options());
   }
   [[nodiscard]] std::string refusal(const std::string& file) const {
     try {
-      const KeptViews kept(path(file));
+      const TrainingArchive kept(path(file));
       std::vector<std::uint8_t> pictures(kept.objects()[0].count * 32 * 32 * 3);
       std::vector<float> energies(kept.objects()[0].count);
       kept.read(0, pictures, energies);
@@ -71,7 +71,7 @@ class KeptViewsTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(KeptViewsTest, AnObjectThatJoinsGivesTheModelLearnedAnewByteForByte) {
+TEST_F(TrainingArchiveTest, AnObjectThatJoinsGivesTheModelLearnedAnewByteForByte) {
   write("one", 1);
   write("two", 2);
   keep("kept");
@@ -83,7 +83,7 @@ TEST_F(KeptViewsTest, AnObjectThatJoinsGivesTheModelLearnedAnewByteForByte) {
   EXPECT_EQ(grown, learned_anew());
 }
 
-TEST_F(KeptViewsTest, WithoutAnObjectTheModelIsTheOneLearnedAnewByteForByte) {
+TEST_F(TrainingArchiveTest, WithoutAnObjectTheModelIsTheOneLearnedAnewByteForByte) {
   write("one", 1);
   write("two", 2);
   write("three", 3);
@@ -95,7 +95,7 @@ TEST_F(KeptViewsTest, WithoutAnObjectTheModelIsTheOneLearnedAnewByteForByte) {
   EXPECT_EQ(shrunk, learned_anew());
 }
 
-TEST_F(KeptViewsTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
+TEST_F(TrainingArchiveTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
   LearningOptions gradient = testing::small_learning();
   set_image_type(gradient.normalization, "gradient");
   LearningOptions parts = testing::small_learning();
@@ -109,7 +109,7 @@ TEST_F(KeptViewsTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
     write("one", 1);
     write("two", 2);
     keep("kept", options);
-    EXPECT_EQ(KeptViews(path("kept")).products().size() > 0, options.solver.solver != "krylov");
+    EXPECT_EQ(TrainingArchive(path("kept")).products().size() > 0, options.solver.solver != "krylov");
     std::filesystem::remove_all(sets());
     write("three", 3);
     const auto changed = updated("kept", {"one"}, open_image_sets(sets()));
@@ -118,13 +118,13 @@ TEST_F(KeptViewsTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
   }
 }
 
-TEST_F(KeptViewsTest, TheUpdateKeepsItsViewsInTurn) {
+TEST_F(TrainingArchiveTest, TheUpdateKeepsItsViewsInTurn) {
   write("one", 1);
   write("two", 2);
   keep("kept");
   std::filesystem::remove_all(sets());
   write("three", 3);
-  LearningOptions options = KeptViews(path("kept")).options();
+  LearningOptions options = TrainingArchive(path("kept")).options();
   options.kept_views = path("kept");
   (void)updated("kept", {"one"}, open_image_sets(sets()), options);
   std::filesystem::remove_all(sets());
@@ -133,7 +133,7 @@ TEST_F(KeptViewsTest, TheUpdateKeepsItsViewsInTurn) {
   EXPECT_EQ(last, learned_anew());
 }
 
-TEST_F(KeptViewsTest, ReadyCutViewsComeAndGoAmongOthers) {
+TEST_F(TrainingArchiveTest, ReadyCutViewsComeAndGoAmongOthers) {
   write("one", 1);
   ImageSetWriter writer(sets(), "cut", turntable_workspace(), nlohmann::json::object(),
                         {.cropped = true, .sync_every_view = false});
@@ -152,7 +152,7 @@ TEST_F(KeptViewsTest, ReadyCutViewsComeAndGoAmongOthers) {
   EXPECT_EQ(updated("cut", {}, open_image_sets(path("one"))), all) << "the others are joined";
 }
 
-TEST_F(KeptViewsTest, ViewsBeyondTheMemoryLimitComeAndGoToo) {
+TEST_F(TrainingArchiveTest, ViewsBeyondTheMemoryLimitComeAndGoToo) {
   testing::write_turn(sets(), "one", 1, 36);
   write("two", 2);
   LearningOptions options = testing::small_learning();
@@ -165,11 +165,11 @@ TEST_F(KeptViewsTest, ViewsBeyondTheMemoryLimitComeAndGoToo) {
   EXPECT_EQ(updated("kept", {"two"}, {}, options), learned_anew(options));
 }
 
-TEST_F(KeptViewsTest, RefusesNamesThatAreNotThereOrTaken) {
+TEST_F(TrainingArchiveTest, RefusesNamesThatAreNotThereOrTaken) {
   write("one", 1);
   write("two", 2);
   keep("kept");
-  const KeptViews kept(path("kept"));
+  const TrainingArchive kept(path("kept"));
   const auto message = [&](const std::vector<std::string>& leaving, const std::vector<ImageSet>& joining) {
     try {
       (void)updated_sets(kept, leaving, joining);
@@ -183,10 +183,10 @@ TEST_F(KeptViewsTest, RefusesNamesThatAreNotThereOrTaken) {
   EXPECT_EQ(message({"one"}, {ImageSet::open(sets() / "one")}), "accepted");
 }
 
-TEST_F(KeptViewsTest, RefusesAnotherNormalisation) {
+TEST_F(TrainingArchiveTest, RefusesAnotherNormalisation) {
   write("one", 1);
   keep("kept");
-  const KeptViews kept(path("kept"));
+  const TrainingArchive kept(path("kept"));
   LearningOptions options = kept.options();
   options.normalization.size = 24;
   EXPECT_THROW((void)learn(updated_sets(kept, {}, {}), options), Error);
@@ -195,7 +195,7 @@ TEST_F(KeptViewsTest, RefusesAnotherNormalisation) {
   EXPECT_THROW((void)learn(updated_sets(kept, {}, {}), options), Error);
 }
 
-TEST_F(KeptViewsTest, RefusesOneFlippedByteAnywhereAndAFileCutOff) {
+TEST_F(TrainingArchiveTest, RefusesOneFlippedByteAnywhereAndAFileCutOff) {
   write("one", 1);
   keep("kept");
   EXPECT_EQ(refusal("kept"), "accepted");
@@ -226,7 +226,7 @@ TEST_F(KeptViewsTest, RefusesOneFlippedByteAnywhereAndAFileCutOff) {
   EXPECT_THAT(refusal("kept"), HasSubstr("no kept views"));
 }
 
-TEST_F(KeptViewsTest, AreNotTouchedWhereLearningFails) {
+TEST_F(TrainingArchiveTest, AreNotTouchedWhereLearningFails) {
   write("one", 1);
   keep("kept");
   const auto before = read_file(path("kept"));

@@ -73,14 +73,14 @@ TEST(PartsRecognizer, MoreSpeaksForACoveredObjectThanForStrangers) {
     views.push_back(test::turntable_views(test::DrawnObject(20 + o), 15.0));
   PartsModel learned = model();
   calibrate_parts(learned, views, {});
-  const double threshold = covered_threshold(measure_covered(learned, views, {}), 0.1);
+  const double threshold = occlusion_threshold(measure_occlusion(learned, views, {}), 0.1);
   PartsRecognizer recognizer(learned);
   const auto accepted = [&](cv::Mat picture) {
     picture(cv::Rect(8, 18, 24, 24)).setTo(0);
     recognizer.look(picture);
     const PartsIdentification found = recognizer.identify();
     return found.best.covered > learned.calibration[found.best.object].covered_share &&
-           found.best.covered <= most_covered && found.evidence > threshold;
+           found.best.covered <= max_occluded_share && found.evidence > threshold;
   };
   int known = 0;
   int strangers = 0;
@@ -95,19 +95,19 @@ TEST(PartsRecognizer, MoreSpeaksForACoveredObjectThanForStrangers) {
 }
 
 TEST(CoveredThreshold, IsConformalAndForgetsTheObjectLeftOut) {
-  const std::vector<CoveredEvidence> strangers = {{0, 1, 5.0}, {1, 0, 9.0}, {2, 1, 3.0}, {2, 0, 7.0}};
+  const std::vector<OcclusionEvidence> strangers = {{0, 1, 5.0}, {1, 0, 9.0}, {2, 1, 3.0}, {2, 0, 7.0}};
   // One of five, counting the new one, is the largest.
-  EXPECT_EQ(covered_threshold(strangers, 0.2), 9.0);
-  EXPECT_EQ(covered_threshold(strangers, 0.4), 7.0);
-  EXPECT_EQ(covered_threshold(strangers, 0.001), 9.0)
+  EXPECT_EQ(occlusion_threshold(strangers, 0.2), 9.0);
+  EXPECT_EQ(occlusion_threshold(strangers, 0.4), 7.0);
+  EXPECT_EQ(occlusion_threshold(strangers, 0.001), 9.0)
       << "four strangers support no smaller rate than a fifth";
-  EXPECT_EQ(covered_threshold(strangers, 0.25, 0), 4.0) << "no less is ever enough";
-  EXPECT_EQ(covered_threshold({}, 0.1), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(occlusion_threshold(strangers, 0.25, 0), 4.0) << "no less is ever enough";
+  EXPECT_EQ(occlusion_threshold({}, 0.1), std::numeric_limits<double>::infinity());
 }
 
 TEST(CoveredCalibration, NeedsTwoObjects) {
   PartsModel one;
-  EXPECT_TRUE(measure_covered(one, std::vector<PartsViews>(1), {}).empty());
+  EXPECT_TRUE(measure_occlusion(one, std::vector<PartsViews>(1), {}).empty());
 }
 
 TEST(PartsRecognizer, GivesAStrangerAWorseScoreThanAKnownObject) {

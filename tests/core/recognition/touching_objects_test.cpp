@@ -51,7 +51,7 @@ cv::Mat touching(int left, double left_angle, int right, double right_angle, Rec
   }
 }
 
-TEST(FusedRegion, TellsTouchingObjectsApart) {
+TEST(TouchingObjects, TellsTouchingObjectsApart) {
   Recognizer recognize(world().model);
   int right = 0;
   int pairs = 0;
@@ -104,7 +104,7 @@ TEST(PartsStage, IsLessSureTheMoreIsCovered) {
   EXPECT_LT(last, 0.9);
 }
 
-TEST(FusedRegion, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
+TEST(TouchingObjects, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
   Model model = *world().model;
   auto parts = std::make_shared<PartsModel>(*model.parts);
   ASSERT_EQ(model.objects[1].name, "three");
@@ -118,7 +118,7 @@ TEST(FusedRegion, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
   EXPECT_EQ(outcomes[1].best->object, "two");
 }
 
-TEST(FusedRegion, LeavesAnObjectThatStandsNearerThanItWasLearnedInOnePiece) {
+TEST(TouchingObjects, LeavesAnObjectThatStandsNearerThanItWasLearnedInOnePiece) {
   Recognizer recognize(world().model);
   for (double angle = 5.0; angle < 360.0; angle += 60.0) {
     SceneKnobs near = SceneKnobs::centred(400, 300, 2.4);  // half as large again
@@ -130,7 +130,7 @@ TEST(FusedRegion, LeavesAnObjectThatStandsNearerThanItWasLearnedInOnePiece) {
   }
 }
 
-TEST(FusedRegion, LeavesStrangersInOnePiece) {
+TEST(TouchingObjects, LeavesStrangersInOnePiece) {
   Recognizer recognize(world().model);
   int taken_apart = 0;
   for (int kind = 20; kind < 32; ++kind) {
@@ -145,7 +145,7 @@ TEST(FusedRegion, LeavesStrangersInOnePiece) {
   EXPECT_LE(taken_apart, 1) << "of 12; made-up objects are much alike";
 }
 
-TEST(FusedRegion, AKnownObjectIsToldBesideAStranger) {
+TEST(TouchingObjects, AKnownObjectIsToldBesideAStranger) {
   Recognizer recognize(world().model);
   int told = 0;
   int shown = 0;

@@ -10,57 +10,57 @@
 namespace eigenpose {
 namespace {
 
-CellMap map_of(const cv::Mat& picture) {
-  CellMapper mapper;
-  CellMap map;
+OrientationGrid map_of(const cv::Mat& picture) {
+  OrientationGridMaker mapper;
+  OrientationGrid map;
   mapper.compute(picture, map);
   return map;
 }
 
-TEST(CellMap, OfAMirroredPictureIsTheMirroredMap) {
+TEST(OrientationGrid, OfAMirroredPictureIsTheMirroredMap) {
   const cv::Mat picture = test::DrawnObject(1).view(40.0);
-  const CellMap map = map_of(picture);
-  const CellMap other = map_of(mirrored(picture));
+  const OrientationGrid map = map_of(picture);
+  const OrientationGrid other = map_of(mirrored(picture));
   // Rounding only: the same sums in another order.
   constexpr float tolerance = 2e-4F;
-  for (int r = 0; r < CellMap::side; ++r) {
-    for (int c = 0; c < CellMap::side; ++c) {
-      const int m = CellMap::side - 1 - c;
+  for (int r = 0; r < OrientationGrid::side; ++r) {
+    for (int c = 0; c < OrientationGrid::side; ++c) {
+      const int m = OrientationGrid::side - 1 - c;
       EXPECT_NEAR(map.brightness_at(r, c)[0], other.brightness_at(r, m)[0], tolerance);
-      for (int b = 0; b < CellMap::bins; ++b) {
+      for (int b = 0; b < OrientationGrid::bins; ++b) {
         // Left and right change places: angle a becomes 180° − a.
-        const int turned = (CellMap::bins / 2 - b + CellMap::bins) % CellMap::bins;
+        const int turned = (OrientationGrid::bins / 2 - b + OrientationGrid::bins) % OrientationGrid::bins;
         EXPECT_NEAR(map.orientation_at(r, c)[b], other.orientation_at(r, m)[turned], tolerance);
       }
     }
   }
 }
 
-TEST(CellMap, PutsAnEdgeIntoTheBinOfItsDirection) {
+TEST(OrientationGrid, PutsAnEdgeIntoTheBinOfItsDirection) {
   cv::Mat picture(64, 64, CV_8UC1, cv::Scalar(0));
   picture.colRange(32, 64).setTo(255);  // brighter to the right: gradient along +x, bin 0
-  const CellMap map = map_of(picture);
+  const OrientationGrid map = map_of(picture);
   double right = 0.0;
   double all = 0.0;
-  for (int i = 0; i < CellMap::side * CellMap::side; ++i) {
-    right += map.orientation[static_cast<std::size_t>(i) * CellMap::bins];
-    all += std::accumulate(map.orientation.begin() + i * CellMap::bins,
-                           map.orientation.begin() + (i + 1) * CellMap::bins, 0.0);
+  for (int i = 0; i < OrientationGrid::side * OrientationGrid::side; ++i) {
+    right += map.orientation[static_cast<std::size_t>(i) * OrientationGrid::bins];
+    all += std::accumulate(map.orientation.begin() + i * OrientationGrid::bins,
+                           map.orientation.begin() + (i + 1) * OrientationGrid::bins, 0.0);
   }
   EXPECT_GT(all, 0.0);
   EXPECT_NEAR(right, all, 1e-6 * all);
 }
 
-TEST(CellMap, IsZeroInItsFrame) {
-  const CellMap map = map_of(cv::Mat(64, 64, CV_8UC1, cv::Scalar(200)));
+TEST(OrientationGrid, IsZeroInItsFrame) {
+  const OrientationGrid map = map_of(cv::Mat(64, 64, CV_8UC1, cv::Scalar(200)));
   EXPECT_EQ(map.brightness_at(1, 7)[0], 0.0F);
   EXPECT_GT(map.brightness_at(2, 7)[0], 0.0F);
   EXPECT_NEAR(map.brightness_at(10, 10)[0], std::sqrt(200.0F / 255.0F), 1e-4F);
 }
 
-TEST(CellMap, RefusesAPictureThatIsNotSquare) {
-  CellMapper mapper;
-  CellMap map;
+TEST(OrientationGrid, RefusesAPictureThatIsNotSquare) {
+  OrientationGridMaker mapper;
+  OrientationGrid map;
   EXPECT_THROW(mapper.compute(cv::Mat(64, 60, CV_8UC1, cv::Scalar(0)), map), std::invalid_argument);
   EXPECT_THROW(mapper.compute(cv::Mat(64, 64, CV_32FC1, cv::Scalar(0)), map), std::invalid_argument);
 }
