@@ -1,9 +1,11 @@
 #include "core/base/error.h"
 
+#include "core/base/printable.h"
+
 namespace eigenpose {
 
 FileError::FileError(std::filesystem::path file, const std::string& what)
-    : Error(file.string() + ": " + what), file_(std::move(file)) {}
+    : Error(printable(file.string()) + ": " + what), file_(std::move(file)) {}
 
 DeviceError::DeviceError(std::string device, std::string operation, const std::string& cause)
     : Error(device + ": " + operation + ": " + cause),

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "core/base/atomic_file.h"
 #include "core/base/error.h"
 
 namespace eigenpose {
@@ -17,14 +18,15 @@ ScratchFile::ScratchFile(const std::filesystem::path& folder, std::uintmax_t siz
   std::error_code error;
   const auto space = std::filesystem::space(folder_, error);
   if (!error && space.available < size)
-    throw FileError(folder_,
-                    "has " + std::to_string(space.available >> 20) + " MiB free, " +
-                        std::to_string((size >> 20) + 1) +
-                        " are needed for views that do not fit into memory; make room or raise the memory "
-                        "limit");
+    throw FileError(folder_, "has " + std::to_string(space.available >> 20) +
+                                 " MiB free, but views that do not fit into "
+                                 "memory take " +
+                                 std::to_string((size >> 20) + 1) +
+                                 " MiB; make room or raise the memory limit");
   std::string name = (folder_ / ".eigenpose-scratch-XXXXXX").string();
   fd_ = ::mkostemp(name.data(), O_CLOEXEC);
-  if (fd_ < 0) throw FileError(folder_, std::string("takes no scratch file: ") + std::strerror(errno));
+  if (fd_ < 0)
+    throw FileError(folder_, std::string("a scratch file cannot be made: ") + write_trouble(errno));
   ::unlink(name.c_str());
 }
 
@@ -37,7 +39,8 @@ void ScratchFile::write(std::uintmax_t at, std::span<const std::uint8_t> bytes) 
     const ssize_t n = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(at));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0)
-      throw FileError(folder_, std::string("scratch file cannot be written: ") + std::strerror(errno));
+      throw FileError(folder_,
+                      "its scratch file cannot be written: " + write_trouble(n < 0 ? errno : ENOSPC));
     at += static_cast<std::uintmax_t>(n);
     bytes = bytes.subspan(static_cast<std::size_t>(n));
   }
@@ -48,7 +51,7 @@ void ScratchFile::read(std::uintmax_t at, std::span<std::uint8_t> bytes) const {
     const ssize_t n = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(at));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0)
-      throw FileError(folder_, std::string("scratch file cannot be read: ") +
+      throw FileError(folder_, std::string("its scratch file cannot be read: ") +
                                    (n == 0 ? "it is shorter than it should be" : std::strerror(errno)));
     at += static_cast<std::uintmax_t>(n);
     bytes = bytes.subspan(static_cast<std::size_t>(n));

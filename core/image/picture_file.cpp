@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -90,17 +88,6 @@ std::optional<std::string> damage(Bytes bytes) {
 }
 
 }  // namespace
-
-std::vector<unsigned char> read_file(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file)) throw FileError(file, "is a folder; give a file");
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw FileError(file, std::string("cannot be opened: ") + std::strerror(errno));
-  std::vector<unsigned char> bytes(std::filesystem::file_size(file));
-  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (static_cast<std::size_t>(in.gcount()) != bytes.size())
-    throw FileError(file, "cannot be read to its end");
-  return bytes;
-}
 
 cv::Mat decode_picture(Bytes bytes, const std::filesystem::path& name) {
   if (bytes.empty()) throw FileError(name, "is empty; put the picture there again");

@@ -8,6 +8,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "core/base/input_file.h"
+
 namespace eigenpose {
 
 /// Decodes a whole file: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; an alpha band is dropped.
@@ -23,8 +25,5 @@ cv::Mat decode_picture(std::span<const unsigned char> bytes, const std::filesyst
 
 /// Encodes as PNG. @throws std::invalid_argument for a type that `load_picture` does not return.
 std::vector<unsigned char> encode_png(const cv::Mat& image);
-
-/// The bytes of a whole file. @throws FileError.
-std::vector<unsigned char> read_file(const std::filesystem::path& file);
 
 }  // namespace eigenpose
