@@ -2,23 +2,26 @@
 
 /// An image set: all views of one object, on disk as ordinary files that a person can look through.
 ///
-///     SETS/mug/set.json      format, version, object, workspace, where it comes from, cropped, complete or
-///     not SETS/mug/views.jsonl   one JSON object a line: {"file": "000000.png", "q": [0.0], ...}
+///     SETS/mug/set.json      format, version, object, workspace, source, cropped, complete
+///     SETS/mug/views.jsonl   one JSON object a line: {"file": "000000.png", "q": [0.0], ...}
 ///     SETS/mug/000000.png    the views
 ///
 /// `views.jsonl` is a journal: a line is appended only after its image is safely on disk, so that an
 /// interrupted acquisition keeps everything it has taken and can be continued. A last line without its end,
-/// left by a crash, does not count.
+/// left by a crash, does not count. While a writer lives it holds SETS/mug/.lock.
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 #include <opencv2/core.hpp>
 
+#include "core/base/error.h"
+#include "core/base/object_name.h"
 #include "core/base/workspace.h"
 
 namespace eigenpose {
@@ -58,8 +61,19 @@ class ImageSet {
   bool complete_ = false;
 };
 
-/// Every image set below `root`, ordered by object name with numbers as numbers (obj9 before obj10).
-/// @throws FileError when there is none.
+/// Image sets below a folder, and those that had to be left out.
+struct FoundImageSets {
+  std::vector<ImageSet> sets;  ///< ordered by object name with numbers as numbers (obj9 before obj10)
+  /// One for each folder that cannot be used: unreadable, malformed, or of the same object as another.
+  std::vector<FileError> left_out;
+};
+
+/// The image set that `root` is, or every one below it. One folder that cannot be used does not stop the
+/// others.
+/// @throws FileError when there is none that can be used, or `root` itself is a set and cannot.
+FoundImageSets find_image_sets(const std::filesystem::path& root);
+
+/// The same for callers who need all of them: the first one left out is thrown. @throws FileError.
 std::vector<ImageSet> open_image_sets(const std::filesystem::path& root);
 
 /// What a writer promises and records, beside the views.
@@ -71,18 +85,15 @@ struct ImageSetOptions {
   bool sync_every_view = true;
 };
 
-/// @throws std::invalid_argument for an object name that is not 1 to 64 of [A-Za-z0-9_.-] starting with a
-/// letter or digit.
-void check_object_name(const std::string& name);
-
-/// Writes an image set view by view. One thread at a time.
+/// Writes an image set view by view. One thread at a time. While it lives it owns the folder: a second
+/// writer, also of another program, is refused.
 class ImageSetWriter {
  public:
   /// Makes `root/object` (and continues an incomplete set of the same object and workspace that stands
   /// there).
   /// @param source a JSON object that says where the views come from; kept in set.json.
-  /// @throws FileError when a complete set stands there already or the folder cannot be written;
-  /// what check_object_name throws.
+  /// @throws FileError when a complete set stands there already, another writer has it, or the folder cannot
+  /// be written; what check_object_name throws.
   ImageSetWriter(const std::filesystem::path& root, const std::string& object, Workspace workspace,
                  const nlohmann::json& source, ImageSetOptions options = {});
   ImageSetWriter(const ImageSetWriter&) = delete;
@@ -93,7 +104,8 @@ class ImageSetWriter {
   /// Views that stood there when it was opened.
   [[nodiscard]] const std::vector<ViewRecord>& views() const { return views_; }
   /// Image to disk, then its journal line. @throws FileError (disk full, …); then the set is as it was
-  /// before; std::invalid_argument for a `q` of the wrong length or not finite, or a picture of another kind.
+  /// before, unless the journal's flush alone failed: then the view is counted, and may be lost with the
+  /// power; std::invalid_argument for a `q` of the wrong length or not finite, or a picture of another kind.
   void add(const cv::Mat& image, std::vector<double> q);
   /// The same with further facts about this view, kept in its journal line (a JSON object, e.g.
   /// {"exposure_us": 5}).
@@ -102,14 +114,21 @@ class ImageSetWriter {
   void finish();
 
  private:
+  struct Files;
+
+  /// Reads the unfinished set that stands in the folder. @return the bytes of its journal that are good.
+  std::uint64_t take_up();
+  /// The set is as it was before: no line of the view in the journal, no picture without a line.
+  void drop_view(const std::filesystem::path& file, std::uint64_t journal_bytes) noexcept;
+
   std::filesystem::path folder_;
   std::string object_;
   Workspace workspace_;
   ImageSetOptions options_;
   std::vector<ViewRecord> views_;
-  std::string source_;          ///< JSON text
-  std::size_t next_file_ = 0;   ///< number of the next file name
-  std::uintmax_t journal_ = 0;  ///< bytes of views.jsonl that are good
+  std::unique_ptr<Files> files_;
+  std::string source_;         ///< JSON text
+  std::size_t next_file_ = 0;  ///< number of the next file name
 };
 
 }  // namespace eigenpose

@@ -1,15 +1,16 @@
 #include "core/dataset/image_set_format.h"
 
-#include <algorithm>
-#include <cmath>
 #include <set>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
-#include "core/image/picture_file.h"
+#include "core/base/input_file.h"
+#include "core/base/json.h"
+#include "core/base/object_name.h"
 
 namespace eigenpose {
 namespace {
@@ -19,40 +20,28 @@ using nlohmann::json;
 constexpr const char* format_name = "eigenpose image set";
 constexpr int format_version = 1;
 
-json parse_json(const std::filesystem::path& file, std::string_view text, const std::string& where) {
-  json value = json::parse(text, nullptr, false);
-  if (value.is_discarded() || !value.is_object())
-    throw FileError(file, where + "is not a JSON object; restore the file or import the set again");
-  return value;
-}
-
-/// The value of `key`, of type T. @throws FileError naming file and key.
-template <typename T>
-T required(const json& object, const char* key, const std::filesystem::path& file, const std::string& where) {
-  const auto found = object.find(key);
-  if (found == object.end()) throw FileError(file, where + "has no \"" + key + "\"");
+/// Calls `read`; what it finds wrong is wrong in `file`, at `where`.
+template <typename Read>
+auto in_file(const std::filesystem::path& file, const std::string& where, const Read& read) {
   try {
-    return found->get<T>();
-  } catch (const json::exception&) {
-    throw FileError(file, where + "\"" + key + "\" is " + found->dump() + ", which is of the wrong kind");
-  }
-}
-
-Workspace parse_workspace(const json& list, const std::filesystem::path& file) {
-  std::vector<Dof> dofs;
-  for (const json& item : list) {
-    if (!item.is_object()) throw FileError(file, "\"workspace\" holds something that is not a JSON object");
-    const std::string where = "in \"workspace\": ";
-    dofs.push_back(
-        {required<std::string>(item, "name", file, where), required<std::string>(item, "unit", file, where),
-         required<double>(item, "lower", file, where), required<double>(item, "upper", file, where),
-         required<bool>(item, "periodic", file, where)});
-  }
-  try {
-    return Workspace(std::move(dofs));
+    return read();
+  } catch (const JsonError& wrong) {
+    throw FileError(file, where + wrong.what() + "; restore the file, or acquire or import the set again");
   } catch (const std::invalid_argument& wrong) {
-    throw FileError(file, std::string("\"workspace\": ") + wrong.what());
+    throw FileError(file, where + wrong.what() + "; restore the file, or acquire or import the set again");
   }
+}
+
+/// @throws JsonError, std::invalid_argument.
+Workspace parse_workspace(const json& list) {
+  if (!list.is_array()) throw JsonError("\"workspace\" is not an array");
+  std::vector<Dof> dofs;
+  for (const json& item : list)
+    dofs.push_back(
+        {json_text(json_member(item, "name"), "name"), json_text(json_member(item, "unit"), "unit"),
+         json_number(json_member(item, "lower"), "lower"), json_number(json_member(item, "upper"), "upper"),
+         json_flag(json_member(item, "periodic"), "periodic")});
+  return Workspace(std::move(dofs));
 }
 
 json describe(const Workspace& workspace) {
@@ -68,21 +57,18 @@ json describe(const Workspace& workspace) {
 
 /// A file name inside the folder, no way out of it.
 bool plain_file_name(const std::string& name) {
-  return !name.empty() && name.front() != '.' && name.find('/') == std::string::npos;
+  return !name.empty() && name.front() != '.' &&
+         name.find_first_of(std::string_view("/\0", 2)) == std::string::npos;
 }
 
-ViewRecord parse_view(std::string_view text, const Workspace& workspace, const std::filesystem::path& file,
-                      const std::string& where) {
-  const json line = parse_json(file, text, where);
-  ViewRecord view{required<std::string>(line, "file", file, where),
-                  required<std::vector<double>>(line, "q", file, where)};
-  if (!plain_file_name(view.file))
-    throw FileError(file, where + "\"file\" is not the name of a file in this folder");
+/// @throws JsonError.
+ViewRecord parse_view(std::string_view text, const Workspace& workspace) {
+  const json line = parse_json(text);
+  ViewRecord view{json_text(json_member(line, "file"), "file"), json_numbers(json_member(line, "q"), "q")};
+  if (!plain_file_name(view.file)) throw JsonError("\"file\" is not the name of a file in this folder");
   if (view.q.size() != workspace.size())
-    throw FileError(file, where + "\"q\" has " + std::to_string(view.q.size()) +
-                              " values, the workspace has " + std::to_string(workspace.size()));
-  if (!std::all_of(view.q.begin(), view.q.end(), [](double v) { return std::isfinite(v); }))
-    throw FileError(file, where + "\"q\" is not finite");
+    throw JsonError("\"q\" has " + std::to_string(view.q.size()) + " values, the workspace has " +
+                    std::to_string(workspace.size()));
   view.q = workspace.canonical(view.q);
   return view;
 }
@@ -92,7 +78,8 @@ ViewRecord parse_view(std::string_view text, const Workspace& workspace, const s
 SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, bool complete) {
   const auto file = folder / "views.jsonl";
   SetJournal journal;
-  if (!std::filesystem::exists(file)) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error) {
     if (complete) throw FileError(file, "is missing; the image set cannot be used without it");
     return journal;
   }
@@ -102,14 +89,14 @@ SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace
   std::size_t number = 0;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = text.find('\n', at);
-    const std::string where = "line " + std::to_string(++number) + " ";
+    const std::string where = "line " + std::to_string(++number) + ": ";
     if (end == std::string_view::npos) {
-      if (complete) throw FileError(file, where + "is cut off; restore the file or acquire the set again");
+      if (complete) throw FileError(file, where + "it is cut off; restore the file or acquire the set again");
       break;  // what a crash in the middle of `add` leaves
     }
-    ViewRecord view = parse_view(text.substr(at, end - at), workspace, file, where);
+    ViewRecord view = in_file(file, where, [&] { return parse_view(text.substr(at, end - at), workspace); });
     if (!seen.insert(view.file).second)
-      throw FileError(file, where + "names \"" + view.file + "\" a second time");
+      throw FileError(file, where + "it names \"" + view.file + "\" a second time");
     journal.views.push_back(std::move(view));
     at = end + 1;
     journal.good_bytes = at;
@@ -121,21 +108,31 @@ SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace
 
 SetIndex read_set_index(const std::filesystem::path& folder) {
   const auto file = folder / "set.json";
-  if (!std::filesystem::exists(file))
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error)
     throw FileError(
         folder,
         "is not an image set: it has no set.json; 'eigenpose import' and 'eigenpose acquire' make them");
   const auto bytes = read_file(file);
-  const json all = parse_json(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, "");
-  if (required<std::string>(all, "format", file, "") != format_name)
-    throw FileError(file, std::string("is not of the format \"") + format_name + "\"");
-  if (const int version = required<int>(all, "version", file, ""); version != format_version)
-    throw FileError(file, "has version " + std::to_string(version) + ", this program reads version " +
-                              std::to_string(format_version) + "; import or acquire the set again");
-  SetIndex index{required<std::string>(all, "object", file, ""),
-                 parse_workspace(required<json>(all, "workspace", file, ""), file),
-                 required<bool>(all, "cropped", file, ""), required<bool>(all, "complete", file, "")};
-  return index;
+  return in_file(file, "", [&] {
+    const json all = parse_json({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    if (json_text(json_member(all, "format"), "format") != format_name)
+      throw JsonError(std::string("it is not of the format \"") + format_name + "\"");
+    const auto version = json_integer(json_member(all, "version"), "version", 0, 1'000'000);
+    if (version != format_version)
+      throw JsonError("it has version " + std::to_string(version) + ", this program reads version " +
+                      std::to_string(format_version));
+    SetIndex index{json_text(json_member(all, "object"), "object"),
+                   parse_workspace(json_member(all, "workspace")),
+                   json_flag(json_member(all, "cropped"), "cropped"),
+                   json_flag(json_member(all, "complete"), "complete")};
+    check_object_name(index.object);
+    return index;
+  });
+}
+
+std::string json_line(const nlohmann::json& value, int indent) {
+  return value.dump(indent, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
 std::string set_index_text(const SetIndex& index, const nlohmann::json& source) {
@@ -143,7 +140,7 @@ std::string set_index_text(const SetIndex& index, const nlohmann::json& source) 
                     {"object", index.object},   {"workspace", describe(index.workspace)},
                     {"cropped", index.cropped}, {"complete", index.complete},
                     {"source", source}};
-  return all.dump(2) + "\n";
+  return json_line(all, 2);
 }
 
 }  // namespace eigenpose

@@ -33,6 +33,9 @@ SetIndex read_set_index(const std::filesystem::path& folder);
 /// @throws FileError when views.jsonl is malformed; and for a complete set when it is missing, empty or cut
 /// off.
 SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, bool complete);
+/// One line of a journal (indent −1) or the text of a file. Texts that are not UTF-8, such as old file names,
+/// get the replacement character U+FFFD where they are not.
+std::string json_line(const nlohmann::json& value, int indent = -1);
 /// The text of set.json.
 std::string set_index_text(const SetIndex& index, const nlohmann::json& source);
 

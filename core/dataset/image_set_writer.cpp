@@ -1,17 +1,17 @@
 #include <algorithm>
-#include <cctype>
-#include <cerrno>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <stdexcept>
+#include <system_error>
 
-#include <fcntl.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "core/base/atomic_file.h"
 #include "core/base/error.h"
+#include "core/base/file_lock.h"
+#include "core/base/journal_file.h"
 #include "core/dataset/image_set.h"
 #include "core/dataset/image_set_format.h"
 #include "core/image/picture_file.h"
@@ -20,79 +20,72 @@ namespace eigenpose {
 namespace {
 
 using nlohmann::json;
+namespace fs = std::filesystem;
 
-std::string cause(int error) {
-  return std::strerror(error);
+/// 17 of "000017.png"; nothing of other names.
+std::size_t number_after(const std::string& file) {
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(file.data(), file.data() + file.size(), number);
+  return error == std::errc() && number < 1'000'000'000 ? number + 1 : 0;
 }
 
-/// Appends to a file and tells whether all of it arrived.
-void append(const std::filesystem::path& file, const std::string& text, bool sync) {
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (fd < 0) throw FileError(file, "cannot be opened for writing: " + cause(errno));
-  const ssize_t written = ::write(fd, text.data(), text.size());
-  int error = written < 0 ? errno : written != static_cast<ssize_t>(text.size()) ? ENOSPC : 0;
-  if (error == 0 && sync && ::fdatasync(fd) != 0) error = errno;
-  ::close(fd);
-  if (error != 0)
-    throw FileError(file, "cannot be written: " + cause(error) + "; the views before it are safe");
+std::string file_name(std::size_t number) {
+  std::array<char, 32> name{};
+  std::snprintf(name.data(), name.size(), "%06zu.png", number);
+  return name.data();
 }
 
-void write_plain(const std::filesystem::path& file, const std::vector<unsigned char>& bytes) {
-  std::FILE* out = std::fopen(file.c_str(), "wb");
-  if (out == nullptr) throw FileError(file, "cannot be written: " + cause(errno));
-  const bool whole = std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
-  const int error = errno;
-  if (std::fclose(out) != 0 || !whole)
-    throw FileError(file,
-                    "cannot be written: " + cause(whole ? errno : error) + "; the views before it are safe");
+fs::path made(fs::path folder, const std::string& object, const Workspace& workspace) {
+  check_object_name(object);
+  if (workspace.size() == 0)
+    throw std::invalid_argument("an image set needs a workspace of at least one degree of freedom");
+  make_folders(folder);
+  return folder;
 }
 
 }  // namespace
 
-void check_object_name(const std::string& name) {
-  const auto alphanumeric = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
-  const bool good = !name.empty() && name.size() <= 64 && alphanumeric(name.front()) &&
-                    std::all_of(name.begin(), name.end(),
-                                [&](char c) { return alphanumeric(c) || c == '_' || c == '.' || c == '-'; });
-  if (!good)
-    throw std::invalid_argument(
-        "\"" + name +
-        "\" cannot be an object's name; use 1 to 64 of A-Z a-z 0-9 _ . - and begin with a "
-        "letter or digit");
-}
+/// What a writer holds of its folder: nobody else writes there.
+struct ImageSetWriter::Files {
+  explicit Files(const fs::path& folder) : lock(folder / ".lock", "the image set") {}
+  FileLock lock;
+  std::unique_ptr<JournalFile> journal;
+};
 
-ImageSetWriter::ImageSetWriter(const std::filesystem::path& root, const std::string& object,
-                               Workspace workspace, const json& source, ImageSetOptions options)
-    : folder_(root / object), object_(object), workspace_(std::move(workspace)), options_(options) {
-  check_object_name(object);
-  if (workspace_.size() == 0)
-    throw std::invalid_argument("an image set needs a workspace of at least one degree of freedom");
-  if (std::filesystem::exists(folder_ / "set.json")) {
-    const SetIndex index = read_set_index(folder_);
-    if (index.complete)
-      throw FileError(folder_, "is a complete image set already; remove it or give the object another name");
-    if (index.object != object_ || index.workspace != workspace_ || index.cropped != options_.cropped)
-      throw FileError(folder_,
-                      "is an unfinished image set of another object, workspace or kind of view; remove it or "
-                      "give the object another name");
-    SetJournal journal = read_set_journal(folder_, workspace_, false);
-    views_ = std::move(journal.views);
-    journal_ = journal.good_bytes;
-    if (std::filesystem::exists(folder_ / "views.jsonl"))
-      std::filesystem::resize_file(folder_ / "views.jsonl", journal_);
-    for (const ViewRecord& view : views_)
-      next_file_ = std::max<std::size_t>(next_file_, std::strtoul(view.file.c_str(), nullptr, 10) + 1);
-  } else {
-    std::error_code error;
-    std::filesystem::create_directories(folder_, error);
-    if (error) throw FileError(folder_, "cannot be made: " + error.message());
+ImageSetWriter::ImageSetWriter(const fs::path& root, const std::string& object, Workspace workspace,
+                               const json& source, ImageSetOptions options)
+    : folder_(made(root / object, object, workspace)),
+      object_(object),
+      workspace_(std::move(workspace)),
+      options_(options),
+      files_(std::make_unique<Files>(folder_)),
+      source_(json_line(source)) {
+  remove_abandoned_parts(folder_);
+  std::uint64_t good_bytes = 0;
+  std::error_code error;
+  if (fs::exists(folder_ / "set.json", error) || error)
+    good_bytes = take_up();
+  else
     write_file_atomically(folder_ / "set.json",
                           set_index_text({object_, workspace_, options_.cropped, false}, source));
-  }
-  source_ = source.dump();
+  files_->journal = std::make_unique<JournalFile>(folder_ / "views.jsonl", good_bytes);
 }
 
 ImageSetWriter::~ImageSetWriter() = default;
+
+std::uint64_t ImageSetWriter::take_up() {
+  const SetIndex index = read_set_index(folder_);
+  if (index.complete)
+    throw FileError(folder_, "is a complete image set already; remove it or give the object another name");
+  if (index.object != object_ || index.workspace != workspace_ || index.cropped != options_.cropped)
+    throw FileError(folder_,
+                    "is an unfinished image set of another object, workspace or kind of view; remove it or "
+                    "give the object another name");
+  SetJournal journal = read_set_journal(folder_, workspace_, false);
+  views_ = std::move(journal.views);
+  for (const ViewRecord& view : views_) next_file_ = std::max(next_file_, number_after(view.file));
+  return journal.good_bytes;
+}
 
 void ImageSetWriter::add(const cv::Mat& image, std::vector<double> q) {
   add(image, std::move(q), json::object());
@@ -104,43 +97,41 @@ void ImageSetWriter::add(const cv::Mat& image, std::vector<double> q, const json
     throw std::invalid_argument("a view of \"" + object_ + "\" has a pose that is not finite");
   if (!facts.is_object())
     throw std::invalid_argument("the facts of a view are a JSON object, got " + facts.dump());
-  char name[32];
-  std::snprintf(name, sizeof name, "%06zu.png", next_file_);
+  const std::string name = file_name(next_file_);
   const auto bytes = encode_png(image);
-  const auto file = folder_ / name;
-  const auto journal_file = folder_ / "views.jsonl";
+  const fs::path file = folder_ / name;
   json line = facts;
   line["file"] = name;
   line["q"] = q;
-  const std::string text = line.dump() + "\n";
+  const std::string_view picture(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (options_.sync_every_view)
+    write_file_atomically(file, picture);
+  else
+    write_file_unflushed(file, picture);
+  const std::uint64_t before = files_->journal->size();
   try {
-    if (options_.sync_every_view)
-      write_file_atomically(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    else
-      write_plain(file, bytes);
-    append(journal_file, text, options_.sync_every_view);
+    files_->journal->append(json_line(line));
+    if (options_.sync_every_view) files_->journal->flush();
   } catch (...) {
-    // The set is as it was before: no half line in the journal, no picture without a line.
-    std::error_code ignored;
-    if (std::filesystem::exists(journal_file, ignored))
-      std::filesystem::resize_file(journal_file, journal_, ignored);
-    std::filesystem::remove(file, ignored);
+    drop_view(file, before);
     throw;
   }
-  journal_ += text.size();
   ++next_file_;
   views_.push_back({name, std::move(q)});
 }
 
+void ImageSetWriter::drop_view(const fs::path& file, std::uint64_t journal_bytes) noexcept {
+  try {
+    files_->journal->cut_to(journal_bytes);
+  } catch (...) {  // the journal cuts it off before its next line
+  }
+  std::error_code ignored;
+  fs::remove(file, ignored);  // no picture without a line
+}
+
 void ImageSetWriter::finish() {
   if (views_.empty()) throw FileError(folder_, "has no view and cannot be complete; acquire at least one");
-  if (!options_.sync_every_view) {
-    const int fd = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    const bool synced = fd >= 0 && ::syncfs(fd) == 0;
-    const int error = errno;
-    if (fd >= 0) ::close(fd);
-    if (!synced) throw FileError(folder_, "cannot be flushed to the disk: " + cause(error));
-  }
+  if (!options_.sync_every_view) flush_file_system(folder_);
   write_file_atomically(folder_ / "set.json",
                         set_index_text({object_, workspace_, options_.cropped, true}, json::parse(source_)));
 }
