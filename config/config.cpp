@@ -174,38 +174,25 @@ LampOptions read_lamp(const TomlTable& table, const std::filesystem::path& base)
   return options;
 }
 
-Plan read_plan(const TomlTable& table, const std::vector<Dof>& dofs) {
-  Plan plan;
+PlanOptions read_plan(const TomlTable& table) {
+  PlanOptions plan;
   plan.name = read_name(table, "name");
+  plan.place = table.place();
   for (const TomlTable& row : table.tables("axis")) {
-    PlanAxis axis;
+    PlanAxisOptions axis;
     axis.axis = row.text("axis");
-    const auto dof =
-        std::find_if(dofs.begin(), dofs.end(), [&](const Dof& d) { return d.name == axis.axis; });
-    if (dof == dofs.end()) row.fail("axis", fmt::format("there is no [[axis]] named \"{}\"", axis.axis));
-    axis.positions = row.numbers("at");
-    const bool listed = row.has("at");
-    const bool spaced = row.has("from") || row.has("to") || row.has("count");
-    if (listed == spaced) row.fail("axis", "give either at = [...] or from, to and count");
-    if (spaced) {
-      const double from = row.number("from", std::nullopt, -no_limit, no_limit);
-      const double to = row.number("to", std::nullopt, -no_limit, no_limit);
-      const int count = static_cast<int>(row.integer("count", std::nullopt, 1, 100'000));
-      try {
-        axis.positions = spaced_positions(*dof, from, to, count);
-      } catch (const ConfigError& error) {
-        row.fail("count", error.what());
-      }
+    axis.at = row.numbers("at");
+    axis.spaced = row.has("from") || row.has("to") || row.has("count");
+    if (row.has("at") == axis.spaced) row.fail("axis", "give either at = [...] or from, to and count");
+    if (axis.spaced) {
+      axis.from = row.number("from", std::nullopt, -no_limit, no_limit);
+      axis.to = row.number("to", std::nullopt, -no_limit, no_limit);
+      axis.count = static_cast<int>(row.integer("count", std::nullopt, 1, 100'000));
     }
     row.finish();
     plan.axes.push_back(std::move(axis));
   }
   table.finish();
-  try {
-    check_plan(plan, dofs);
-  } catch (const ConfigError& error) {
-    table.fail("name", error.what());
-  }
   return plan;
 }
 
@@ -273,8 +260,8 @@ Config read(const TomlTable& root, const std::filesystem::path& file) {
   for (const TomlTable& table : lamps) config.lamps.push_back(read_lamp(table, base));
   refuse_twins(lamps, config.lamps, [](const LampOptions& lamp) { return lamp.name; });
   const std::vector<TomlTable> plans = root.tables("plan");
-  for (const TomlTable& table : plans) config.plans.push_back(read_plan(table, config.dofs()));
-  refuse_twins(plans, config.plans, [](const Plan& plan) { return plan.name; });
+  for (const TomlTable& table : plans) config.plans.push_back(read_plan(table));
+  refuse_twins(plans, config.plans, [](const PlanOptions& plan) { return plan.name; });
   if (const auto table = root.table("learn")) config.learn = read_learn(*table);
   if (const auto table = root.table("watch")) config.watch = read_watch(*table);
   if (const auto table = root.table("sim")) config.sim = read_sim(*table);

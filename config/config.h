@@ -2,8 +2,8 @@
 
 /// The configuration of eigenposed as plain values, and the code that reads and checks it.
 ///
-/// config/eigenposed.toml explains every key. A file that is read here is consistent: names are unique, plans
-/// name axes that exist and positions they can reach, simulated devices have a [sim] section.
+/// config/eigenposed.toml explains every key. A file that is read here is consistent: names are unique,
+/// simulated devices have a [sim] section. Whether the axes can follow a plan is the rig's to check.
 
 #include <chrono>
 #include <cstdint>
@@ -14,7 +14,6 @@
 #include <string_view>
 #include <vector>
 
-#include "config/plan.h"
 #include "core/base/workspace.h"
 
 namespace eigenpose {
@@ -87,6 +86,23 @@ struct LampOptions {
   double level = 1.0;             ///< 0…1, set at the start
 };
 
+/// [[plan.axis]]: either `at`, or the three others.
+struct PlanAxisOptions {
+  std::string axis;
+  std::vector<double> at;  ///< in the axis's unit
+  bool spaced = false;     ///< `from`, `to` and `count` are given
+  double from = 0.0;
+  double to = 0.0;
+  int count = 0;
+};
+
+/// [[plan]]
+struct PlanOptions {
+  std::string name;
+  std::vector<PlanAxisOptions> axes;
+  std::string place;  ///< "FILE:LINE", for messages
+};
+
 /// [learn]
 struct LearnOptions {
   int components = 20;           ///< K
@@ -116,7 +132,7 @@ struct Config {
   std::optional<CameraOptions> camera;
   std::vector<AxisOptions> axes;
   std::vector<LampOptions> lamps;
-  std::vector<Plan> plans;
+  std::vector<PlanOptions> plans;
   LearnOptions learn;
   WatchOptions watch;
   std::optional<SimOptions> sim;

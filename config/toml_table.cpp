@@ -247,6 +247,10 @@ void TomlTable::finish() const {
   }
 }
 
+std::string TomlTable::place() const {
+  return fmt::format("{}:{}", impl_->file, impl_->table->source().begin.line);
+}
+
 void TomlTable::fail(std::string_view key, const std::string& what) const {
   const toml::node* node = impl_->table->get(key);
   impl_->fail(node != nullptr ? *node : *impl_->table, key, what);

@@ -51,6 +51,9 @@ class TomlTable {
   /// The tables [[key]], in the order of the file.
   [[nodiscard]] std::vector<TomlTable> tables(std::string_view key) const;
 
+  /// Where the table stands: "FILE:LINE".
+  [[nodiscard]] std::string place() const;
+
   /// Refuses every key that was not asked for, naming the ones that are allowed.
   void finish() const;
 

@@ -281,9 +281,10 @@ Devices make_devices(const Config& config, const Clock& clock) {
   if (config.camera)
     devices.camera = look_up(cameras, config.camera->driver, config.camera->name, *config.camera, bench);
   for (const AxisOptions& axis : config.axes)
-    devices.axes.push_back({axis, look_up(axes, axis.driver, axis.dof.name, axis, bench)});
+    devices.axes.push_back(
+        {{axis.dof, axis.settle, axis.move_timeout}, look_up(axes, axis.driver, axis.dof.name, axis, bench)});
   for (const LampOptions& lamp : config.lamps)
-    devices.lamps.push_back({lamp, look_up(lamps, lamp.driver, lamp.name, lamp, bench)});
+    devices.lamps.push_back({{lamp.name, lamp.level}, look_up(lamps, lamp.driver, lamp.name, lamp, bench)});
   devices.lab = bench.lab;
   devices.simulation = bench.simulation;
   return devices;

@@ -3,24 +3,17 @@
 /// From the configuration's names to devices. devices.cpp holds the one table that names real and simulated
 /// devices side by side; nothing else in the daemon knows which is which.
 
-#include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "config/config.h"
 #include "core/base/clock.h"
+#include "daemon/api/simulation_info.h"
 #include "daemon/rig/frame_hub.h"
 #include "daemon/rig/rig.h"
 
 namespace eigenpose {
-
-/// Where a simulated lab can be reached.
-struct SimulationInfo {
-  std::filesystem::path lab_socket;  ///< places objects, tells the truth
-  int modbus_port = 0;               ///< of its drives, on 127.0.0.1
-};
 
 /// Everything the configuration names, not opened yet.
 struct Devices {

@@ -15,9 +15,11 @@
 #include "config/config.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "daemon/api/event_publisher.h"
 #include "daemon/api/routes.h"
 #include "daemon/api/server.h"
 #include "daemon/api/unix_socket.h"
+#include "daemon/composition.h"
 #include "daemon/devices.h"
 #include "daemon/service/service.h"
 
@@ -80,19 +82,12 @@ void make_folder(const std::filesystem::path& folder, const std::string& key) {
                     "the folder cannot be made: " + error.message() + ": change " + key + " in [daemon]");
 }
 
-ServerOptions server_options(const ApiOptions& api) {
-  ServerOptions options;
-  options.max_connections = api.max_connections;
-  options.max_body = static_cast<std::size_t>(api.max_body_kib) * 1024;
-  options.request_timeout = api.request_timeout;
-  return options;
-}
-
 void run(const Options& options) {
   Config config = read_config(options.config);
   if (!options.runtime_dir.empty())
     config.daemon.runtime_dir = std::filesystem::absolute(options.runtime_dir);
   if (!options.state_dir.empty()) config.daemon.state_dir = std::filesystem::absolute(options.state_dir);
+  const ServiceOptions work = service_options(config);
   if (options.check_only) {
     std::printf("%s: good\n", options.config.c_str());
     return;
@@ -106,9 +101,11 @@ void run(const Options& options) {
   const UnixSocket results(config.results_socket(), config.api.results_mode, config.api.results_group);
   const UnixSocket control(config.control_socket(), config.api.control_mode, config.api.control_group);
   const SteadyClock clock;
-  Service service(config, make_devices(config, clock), clock);
-  Server server(server_options(config.api), make_handler(service));
-  service.results()->on_publish([&server] { server.notify(); });
+  EventPublisher publisher(static_cast<std::size_t>(config.api.event_buffer));
+  Devices devices = make_devices(config, clock);
+  Service service(work, {devices.camera, devices.axes, devices.lamps}, publisher, clock);
+  Server server(server_options(config.api), make_handler({service, publisher.results(), devices.simulation}));
+  const EventLog::Subscription wake_streams = publisher.results()->subscribe([&server] { server.notify(); });
   server.listen(results, Access::read);
   server.listen(control, Access::control);
   server.start();
@@ -118,7 +115,6 @@ void run(const Options& options) {
   const int signal = signals.wait();
   ::sd_notify(0, "STOPPING=1");
   spdlog::info("event=stopping signal={}", signal);
-  service.results()->on_publish({});
   // Leaving the scope ends the rest in reverse: clients, jobs, motion, devices, sockets.
 }
 

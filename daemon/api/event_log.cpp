@@ -1,6 +1,7 @@
 #include "daemon/api/event_log.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace eigenpose {
 
@@ -16,7 +17,7 @@ std::uint64_t EventLog::publish(const std::function<std::string(std::uint64_t)>&
     if (kept_.size() > capacity_) kept_.pop_front();
   }
   const std::lock_guard lock(listener_mutex_);
-  if (listener_) listener_();
+  for (const auto& [id, listener] : listeners_) listener();
   return sequence;
 }
 
@@ -40,9 +41,26 @@ std::uint64_t EventLog::last_sequence() const {
   return last_;
 }
 
-void EventLog::on_publish(std::function<void()> listener) {
+EventLog::Subscription EventLog::subscribe(std::function<void()> listener) {
   const std::lock_guard lock(listener_mutex_);
-  listener_ = std::move(listener);
+  const std::uint64_t id = next_listener_++;
+  listeners_.emplace(id, std::move(listener));
+  return {*this, id};
+}
+
+EventLog::Subscription::Subscription(Subscription&& other) noexcept
+    : log_(std::exchange(other.log_, nullptr)), id_(other.id_) {}
+
+EventLog::Subscription& EventLog::Subscription::operator=(Subscription&& other) noexcept {
+  std::swap(log_, other.log_);
+  std::swap(id_, other.id_);
+  return *this;
+}
+
+EventLog::Subscription::~Subscription() {
+  if (log_ == nullptr) return;
+  const std::lock_guard lock(log_->listener_mutex_);
+  log_->listeners_.erase(id_);
 }
 
 }  // namespace eigenpose

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -37,8 +38,25 @@ class EventLog {
   [[nodiscard]] std::optional<Event> latest() const;
   [[nodiscard]] std::uint64_t last_sequence() const;
 
-  /// Called after each `publish`, on the publishing thread; must be quick. Empty: nobody.
-  void on_publish(std::function<void()> listener);
+  /// Ends a listener's subscription when it is destroyed; then no call of the listener is under way. The log
+  /// outlives it.
+  class Subscription {
+   public:
+    Subscription() = default;  ///< of nothing
+    Subscription(Subscription&& other) noexcept;
+    Subscription& operator=(Subscription&& other) noexcept;
+    ~Subscription();
+
+   private:
+    friend class EventLog;
+    Subscription(EventLog& log, std::uint64_t id) : log_(&log), id_(id) {}
+    EventLog* log_ = nullptr;
+    std::uint64_t id_ = 0;
+  };
+
+  /// Calls `listener` after each `publish`, on the publishing thread, while the subscription lives. It must
+  /// be quick and must not subscribe or unsubscribe.
+  [[nodiscard]] Subscription subscribe(std::function<void()> listener);
 
  private:
   const std::size_t capacity_;
@@ -46,7 +64,8 @@ class EventLog {
   std::deque<std::shared_ptr<const std::string>> kept_;  ///< guarded by mutex_
   std::uint64_t last_ = 0;                               ///< guarded by mutex_: number of kept_.back()
   std::mutex listener_mutex_;
-  std::function<void()> listener_;  ///< guarded by listener_mutex_
+  std::map<std::uint64_t, std::function<void()>> listeners_;  ///< guarded by listener_mutex_
+  std::uint64_t next_listener_ = 1;                           ///< guarded by listener_mutex_
 };
 
 }  // namespace eigenpose

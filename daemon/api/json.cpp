@@ -77,30 +77,41 @@ json to_json(const AxisStatus& axis) {
   return result;
 }
 
+json to_json(const JobResult& result) {
+  if (const auto* acquired = std::get_if<AcquisitionResult>(&result))
+    return {{"folder", acquired->folder.string()}, {"views", acquired->views}, {"kept", acquired->kept}};
+  if (const auto* learned = std::get_if<LearningResult>(&result))
+    return {{"objects", learned->objects},       {"views", learned->views},
+            {"components", learned->components}, {"energy", learned->energy},
+            {"seconds", learned->time.count()},  {"file", learned->file.string()}};
+  return nullptr;
+}
+
 json to_json(const JobStatus& job) {
+  const Failure failure = job.failure.value_or(Failure{});
   return {{"id", job.id},
-          {"kind", job.kind},
+          {"kind", job_kind_name(job.kind)},
           {"subject", or_null(job.subject)},
           {"state", job_state_name(job.state)},
           {"stage", or_null(job.stage)},
           {"done", job.done},
           {"total", job.total},
-          {"error", or_null(job.error)},
-          {"hint", or_null(job.hint)},
-          {"result", job.result.empty() ? json(nullptr) : json::parse(job.result)},
+          {"error", or_null(failure.what)},
+          {"hint", or_null(failure.hint)},
+          {"result", to_json(job.result)},
           {"started", iso_time(job.started)},
           {"ended", job.ended ? json(iso_time(*job.ended)) : json(nullptr)}};
 }
 
-json status_json(Service& service) {
+json status_json(const ApiSources& sources) {
+  Service& service = sources.service;
   json axes = json::array();
   for (const AxisStatus& axis : service.rig().status()) axes.push_back(to_json(axis));
   json running = json::array();
   for (const JobStatus& job : service.jobs().list())
     if (job.state == JobState::running) running.push_back(to_json(job));
   json plans = json::array();
-  for (const Plan& plan : service.config().plans)
-    plans.push_back({{"name", plan.name}, {"views", plan.size()}});
+  for (const Plan& plan : service.plans()) plans.push_back({{"name", plan.name}, {"views", plan.size()}});
 
   const WatchStatus watched = service.watcher().status();
   json model = nullptr;
@@ -116,13 +127,13 @@ json status_json(Service& service) {
              {"created", current->provenance.created}};
   }
   json simulation = nullptr;
-  if (const auto& sim = service.simulation())
+  if (const auto& sim = sources.simulation)
     simulation = {{"lab_socket", sim->lab_socket.string()},
                   {"modbus_endpoint", fmt::format("tcp://127.0.0.1:{}", sim->modbus_port)}};
   return {{"program", "eigenposed"},
           {"version", EIGENPOSE_VERSION},
           {"started", iso_time(service.started())},
-          {"state", service.state()},
+          {"state", service_state_name(service.state())},
           {"camera", to_json(service.camera().status())},
           {"axes", std::move(axes)},
           {"plans", std::move(plans)},
@@ -132,7 +143,7 @@ json status_json(Service& service) {
            {{"frames", watched.frames},
             {"recognitions", watched.recognitions},
             {"error", or_null(watched.error)}}},
-          {"last_result", service.results()->last_sequence()},
+          {"last_result", sources.results->last_sequence()},
           {"jobs", std::move(running)},
           {"sim", std::move(simulation)}};
 }

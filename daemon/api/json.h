@@ -8,6 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/base/workspace.h"
+#include "daemon/api/routes.h"
 #include "daemon/rig/frame_hub.h"
 #include "daemon/rig/rig.h"
 #include "daemon/service/jobs.h"
@@ -22,7 +23,7 @@ nlohmann::json to_json(const Workspace& workspace);
 nlohmann::json to_json(const CameraStatus& camera);
 nlohmann::json to_json(const AxisStatus& axis);
 nlohmann::json to_json(const JobStatus& job);
-nlohmann::json status_json(Service& service);
+nlohmann::json status_json(const ApiSources& sources);
 nlohmann::json objects_json(const Service& service);
 
 }  // namespace eigenpose

@@ -1,8 +1,8 @@
 #include "daemon/api/result_json.h"
 
+#include <chrono>
 #include <cmath>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "daemon/api/json.h"
@@ -12,15 +12,8 @@ namespace {
 
 using nlohmann::json;
 
-const Workspace* workspace_of(const Result& result, const std::string& object) {
-  if (result.model == nullptr) return nullptr;
-  for (const ModelObject& learned : result.model->objects)
-    if (learned.name == object) return &learned.workspace;
-  return nullptr;
-}
-
 /// {"table_deg": 12.3}: each value under its DOF's name and unit.
-json named_pose(const Result& result, const Hypothesis& hypothesis) {
+json named_pose(const SceneResult& result, const Hypothesis& hypothesis) {
   json pose = json::object();
   const Workspace* workspace = workspace_of(result, hypothesis.object);
   if (workspace == nullptr) return pose;
@@ -29,7 +22,7 @@ json named_pose(const Result& result, const Hypothesis& hypothesis) {
   return pose;
 }
 
-json to_json(const Result& result, const std::optional<Hypothesis>& hypothesis) {
+json to_json(const SceneResult& result, const std::optional<Hypothesis>& hypothesis) {
   if (!hypothesis) return nullptr;
   return {{"object", hypothesis->object},
           {"q", hypothesis->q},
@@ -37,7 +30,7 @@ json to_json(const Result& result, const std::optional<Hypothesis>& hypothesis) 
           {"distance", hypothesis->distance}};
 }
 
-json to_json(const Result& result, const Outcome& outcome) {
+json to_json(const SceneResult& result, const Outcome& outcome) {
   json sigma = json::array();
   for (const double value : outcome.q_sigma)
     sigma.push_back(std::isfinite(value) ? json(value) : json(nullptr));
@@ -69,15 +62,15 @@ double milliseconds(Duration duration) {
 
 }  // namespace
 
-std::string result_json(const Result& result, std::uint64_t sequence) {
+std::string result_json(const SceneResult& result, std::uint64_t sequence) {
   json outcomes = json::array();
   for (const Outcome& outcome : result.outcomes) outcomes.push_back(to_json(result, outcome));
   json body = {{"sequence", sequence},
-               {"time", iso_time(std::chrono::system_clock::now())},
-               {"state", result.state == Result::State::settled ? "settled" : "changing"},
-               {"frame_sequence", result.frame->sequence},
+               {"time", iso_time(result.time)},
+               {"state", result.state == SceneResult::State::settled ? "settled" : "changing"},
+               {"frame_sequence", result.frame.sequence},
                {"exposure_monotonic_s",
-                std::chrono::duration<double>(result.frame->exposure_start.time_since_epoch()).count()},
+                std::chrono::duration<double>(result.frame.exposure_start.time_since_epoch()).count()},
                {"outcomes", std::move(outcomes)},
                {"times_ms", nullptr}};
   if (result.times)
@@ -87,18 +80,6 @@ std::string result_json(const Result& result, std::uint64_t sequence) {
                         {"search", milliseconds(result.times->search)},
                         {"total", milliseconds(result.times->total)}};
   return body.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
-std::string result_words(const Result& result) {
-  std::string text;
-  for (const Outcome& outcome : result.outcomes) {
-    text += fmt::format("{}verdict={}", text.empty() ? "" : " ", verdict_name(outcome.verdict));
-    if (outcome.verdict != Verdict::recognized || !outcome.best) continue;
-    text += " object=" + outcome.best->object;
-    const json pose = named_pose(result, *outcome.best);
-    for (const auto& [key, value] : pose.items()) text += fmt::format(" {}={:.1f}", key, value.get<double>());
-  }
-  return text;
 }
 
 }  // namespace eigenpose

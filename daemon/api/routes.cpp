@@ -1,15 +1,17 @@
 #include "daemon/api/routes.h"
 
+#include <algorithm>
 #include <charconv>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "daemon/api/errors.h"
-#include "daemon/api/event_log.h"
 #include "daemon/api/json.h"
 
 namespace eigenpose {
@@ -17,8 +19,10 @@ namespace {
 
 using nlohmann::json;
 
+constexpr int jpeg_quality = 85;
+
 /// A route's code is given the request and what stood in the place of {id}.
-using Act = Answer (*)(Service& service, const Request& request, const std::string& id);
+using Act = Answer (*)(const ApiSources& sources, const Request& request, const std::string& id);
 
 struct Route {
   std::string_view method;
@@ -37,65 +41,85 @@ std::uint64_t sequence_number(const std::string& text, std::uint64_t fallback) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size())
-    throw RequestError(400, "\"" + text + "\" is not a sequence number",
+    throw ServiceError(Fault::invalid_request, "\"" + text + "\" is not a sequence number",
                        "give the id of the last event you have seen");
   return number;
 }
 
+[[noreturn]] void refuse_json(const json::exception& error) {
+  throw ServiceError(Fault::invalid_request,
+                     std::string("the body is not the JSON this needs: ") + error.what(),
+                     "see the API's description");
+}
+
+json parsed(const std::string& body) {
+  try {
+    return body.empty() ? json::object() : json::parse(body);
+  } catch (const json::exception& error) {
+    refuse_json(error);
+  }
+}
+
 /// The body as an object with no other keys than these.
 json body_object(const Request& request, std::initializer_list<std::string_view> allowed) {
-  const json body = request.body.empty() ? json::object() : json::parse(request.body);
-  if (!body.is_object()) throw RequestError(400, "the body is not a JSON object", "send {\"key\": value}");
+  const json body = parsed(request.body);
+  if (!body.is_object())
+    throw ServiceError(Fault::invalid_request, "the body is not a JSON object", "send {\"key\": value}");
   for (const auto& [key, value] : body.items())
     if (std::find(allowed.begin(), allowed.end(), key) == allowed.end())
-      throw RequestError(400, "unknown key \"" + key + "\"",
+      throw ServiceError(Fault::invalid_request, "unknown key \"" + key + "\"",
                          fmt::format("allowed: {}", fmt::join(allowed, ", ")));
   return body;
 }
 
-Answer get_status(Service& service, const Request&, const std::string&) {
-  return reply(status_json(service));
+Answer get_status(const ApiSources& sources, const Request&, const std::string&) {
+  return reply(status_json(sources));
 }
 
-Answer get_objects(Service& service, const Request&, const std::string&) {
-  return reply(objects_json(service));
+Answer get_objects(const ApiSources& sources, const Request&, const std::string&) {
+  return reply(objects_json(sources.service));
 }
 
-Answer get_latest(Service& service, const Request&, const std::string&) {
-  const auto event = service.results()->latest();
+Answer get_latest(const ApiSources& sources, const Request&, const std::string&) {
+  const auto event = sources.results->latest();
   if (!event)
-    throw RequestError(404, "there is no result yet",
+    throw ServiceError(Fault::not_found, "there is no result yet",
                        "results come once a model is learned and the camera runs");
   return Response{200, "application/json", *event->data + "\n", {}};
 }
 
-Answer get_results(Service& service, const Request& request, const std::string&) {
+Answer get_results(const ApiSources& sources, const Request& request, const std::string&) {
   const auto given = request.query.find("after");
   const std::string& after = given != request.query.end() ? given->second : request.last_event_id;
-  return EventStream{service.results(), "result", sequence_number(after, service.results()->last_sequence())};
+  return EventStream{sources.results, "result", sequence_number(after, sources.results->last_sequence())};
 }
 
-Answer get_frame(Service& service, const Request&, const std::string&) {
-  return Response{200, "image/jpeg", service.frame_jpeg(), {}};
+Answer get_frame(const ApiSources& sources, const Request&, const std::string&) {
+  cv::Mat image = sources.service.newest_frame().image;
+  // JPEG has 8 bits; a 16-bit camera keeps its upper ones.
+  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 256.0);
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
+  return Response{200, "image/jpeg", std::string(bytes.begin(), bytes.end()), {}};
 }
 
-Answer get_jobs(Service& service, const Request&, const std::string&) {
+Answer get_jobs(const ApiSources& sources, const Request&, const std::string&) {
   json jobs = json::array();
-  for (const JobStatus& job : service.jobs().list()) jobs.push_back(to_json(job));
+  for (const JobStatus& job : sources.service.jobs().list()) jobs.push_back(to_json(job));
   return reply({{"jobs", std::move(jobs)}});
 }
 
 JobStatus job_or_404(const std::optional<JobStatus>& job, const std::string& id) {
-  if (!job) throw RequestError(404, "there is no job \"" + id + "\"", "GET /v1/jobs lists them");
+  if (!job) throw ServiceError(Fault::not_found, "there is no job \"" + id + "\"", "GET /v1/jobs lists them");
   return *job;
 }
 
-Answer get_job(Service& service, const Request&, const std::string& id) {
-  return reply(to_json(job_or_404(service.jobs().find(id), id)));
+Answer get_job(const ApiSources& sources, const Request&, const std::string& id) {
+  return reply(to_json(job_or_404(sources.service.jobs().find(id), id)));
 }
 
-Answer cancel_job(Service& service, const Request&, const std::string& id) {
-  return reply(to_json(job_or_404(service.jobs().cancel(id), id)), 202);
+Answer cancel_job(const ApiSources& sources, const Request&, const std::string& id) {
+  return reply(to_json(job_or_404(sources.service.jobs().cancel(id), id)), 202);
 }
 
 Response started(const JobStatus& job) {
@@ -106,41 +130,62 @@ Response started(const JobStatus& job) {
 
 /// A plan that stands in the request itself: {"axes": [{"axis": "table", "from": 0, "to": 360, "count":
 /// 36}]}.
-Plan plan_from(const json& given, const Service& service) {
-  Plan plan{"request", {}};
+PlanRequest plan_from(const json& given) {
+  PlanRequest plan{"request", {}};
   for (const json& row : given.at("axes")) {
-    PlanAxis axis{row.at("axis").get<std::string>(), {}};
-    if (row.contains("at")) {
+    PlanAxisRequest axis{row.at("axis").get<std::string>(), {}, {}};
+    if (row.contains("at"))
       axis.positions = row.at("at").get<std::vector<double>>();
-    } else {
-      for (const Dof& dof : service.config().dofs())
-        if (dof.name == axis.axis)
-          axis.positions = spaced_positions(dof, row.at("from").get<double>(), row.at("to").get<double>(),
-                                            row.at("count").get<int>());
-    }
+    else
+      axis.spacing =
+          Spacing{row.at("from").get<double>(), row.at("to").get<double>(), row.at("count").get<int>()};
     plan.axes.push_back(std::move(axis));
   }
   return plan;
 }
 
-Answer post_acquisition(Service& service, const Request& request, const std::string&) {
+struct AcquisitionBody {
+  std::string object;
+  std::variant<std::string, PlanRequest> plan;  ///< the name of one, or one of its own
+};
+
+AcquisitionBody acquisition_body(const Request& request) {
   const json body = body_object(request, {"object", "plan"});
-  const json plan = body.value("plan", json("default"));
-  const std::string object = body.at("object").get<std::string>();
-  return started(service.acquire(
-      object, plan.is_string() ? service.plan(plan.get<std::string>()) : plan_from(plan, service)));
+  try {
+    AcquisitionBody result{body.at("object").get<std::string>(), "default"};
+    if (body.contains("plan")) {
+      const json& plan = body.at("plan");
+      if (plan.is_string())
+        result.plan = plan.get<std::string>();
+      else
+        result.plan = plan_from(plan);
+    }
+    return result;
+  } catch (const json::exception& error) {
+    refuse_json(error);
+  }
 }
 
-Answer post_learn(Service& service, const Request& request, const std::string&) {
+Answer post_acquisition(const ApiSources& sources, const Request& request, const std::string&) {
+  const AcquisitionBody body = acquisition_body(request);
+  return started(
+      std::visit([&](const auto& plan) { return sources.service.acquire(body.object, plan); }, body.plan));
+}
+
+LearnRequest learn_body(const Request& request) {
   const json body = body_object(request, {"components", "objects"});
-  LearnRequest learn;
-  if (body.contains("components")) {
-    learn.components = body.at("components").get<int>();
-    if (*learn.components < 1 || *learn.components > 1024)
-      throw RequestError(400, fmt::format("components is {}", *learn.components), "allowed: 1 to 1024");
+  try {
+    LearnRequest learn;
+    if (body.contains("components")) learn.components = body.at("components").get<int>();
+    if (body.contains("objects")) learn.objects = body.at("objects").get<std::vector<std::string>>();
+    return learn;
+  } catch (const json::exception& error) {
+    refuse_json(error);
   }
-  if (body.contains("objects")) learn.objects = body.at("objects").get<std::vector<std::string>>();
-  return started(service.learn(learn));
+}
+
+Answer post_learn(const ApiSources& sources, const Request& request, const std::string&) {
+  return started(sources.service.learn(learn_body(request)));
 }
 
 /// Everything the API offers.
@@ -169,7 +214,7 @@ bool matches(std::string_view pattern, std::string_view path, std::string& id) {
   return id.find('/') == std::string::npos;
 }
 
-Answer answer(Service& service, const Request& request) {
+Answer answer(const ApiSources& sources, const Request& request) {
   std::vector<std::string_view> methods;
   for (const Route& route : routes) {
     std::string id;
@@ -179,11 +224,11 @@ Answer answer(Service& service, const Request& request) {
       continue;
     }
     if (route.needs == Access::control && request.access != Access::control)
-      throw RequestError(403, "this socket is for reading", "commands go to control.sock beside it");
-    return route.act(service, request, id);
+      return error_response(403, "this socket is for reading", "commands go to control.sock beside it");
+    return route.act(sources, request, id);
   }
   if (methods.empty())
-    throw RequestError(404, "there is no " + request.path, "GET /v1/status is a good start");
+    throw ServiceError(Fault::not_found, "there is no " + request.path, "GET /v1/status is a good start");
   Response refused = error_response(405, request.method + " is not for " + request.path,
                                     fmt::format("allowed: {}", fmt::join(methods, ", ")));
   refused.headers["Allow"] = fmt::format("{}", fmt::join(methods, ", "));
@@ -192,10 +237,10 @@ Answer answer(Service& service, const Request& request) {
 
 }  // namespace
 
-Handler make_handler(Service& service) {
-  return [&service](const Request& request) -> Answer {
+Handler make_handler(ApiSources sources) {
+  return [sources = std::move(sources)](const Request& request) -> Answer {
     try {
-      return answer(service, request);
+      return answer(sources, request);
     } catch (...) {
       return error_response(std::current_exception());
     }

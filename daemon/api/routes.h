@@ -2,12 +2,24 @@
 
 /// The table of what the API offers, and what each entry does.
 
+#include <memory>
+#include <optional>
+
+#include "daemon/api/event_log.h"
 #include "daemon/api/http.h"
+#include "daemon/api/simulation_info.h"
 #include "daemon/service/service.h"
 
 namespace eigenpose {
 
-/// Answers requests with `service`, which must outlive the handler.
-Handler make_handler(Service& service);
+/// What the API shows.
+struct ApiSources {
+  Service& service;
+  std::shared_ptr<const EventLog> results;
+  std::optional<SimulationInfo> simulation;  ///< none: real devices
+};
+
+/// Answers requests. The service must outlive the handler.
+Handler make_handler(ApiSources sources);
 
 }  // namespace eigenpose

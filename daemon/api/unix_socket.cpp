@@ -7,28 +7,16 @@
 #include <grp.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "daemon/api/client/local_address.h"
 
 namespace eigenpose {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
   throw FileError(path, what + ": " + std::strerror(errno));
-}
-
-sockaddr_un address_of(const std::filesystem::path& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::string& name = path.native();
-  if (name.size() >= sizeof(address.sun_path))
-    throw FileError(path, "too long for a socket (" + std::to_string(name.size()) + " bytes, at most " +
-                              std::to_string(sizeof(address.sun_path) - 1) +
-                              "): choose a shorter runtime_dir");
-  std::memcpy(address.sun_path, name.c_str(), name.size() + 1);
-  return address;
 }
 
 gid_t group_id(const std::filesystem::path& path, const std::string& name) {
@@ -41,18 +29,6 @@ gid_t group_id(const std::filesystem::path& path, const std::string& name) {
 }
 
 }  // namespace
-
-bool UnixSocket::is_answered(const std::filesystem::path& path) {
-  const sockaddr_un address = address_of(path);
-  const int probe = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (probe < 0) fail(path, "cannot be tried");
-  const int result = ::connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
-  const int error = result == 0 ? 0 : errno;
-  ::close(probe);
-  // Only a refused connection or a missing file says that nobody listens; anything else (a full queue, no
-  // permission) is a live socket.
-  return error != ECONNREFUSED && error != ENOENT;
-}
 
 UnixSocket::UnixSocket(std::filesystem::path path, unsigned mode, const std::string& group)
     : path_(std::move(path)) {
@@ -69,7 +45,7 @@ UnixSocket::~UnixSocket() {
 }
 
 void UnixSocket::claim(unsigned mode, const std::string& group) {
-  const sockaddr_un address = address_of(path_);
+  const sockaddr_un address = local_address(path_);
   struct stat status {};
   if (::lstat(path_.c_str(), &status) == 0) {
     if (!S_ISSOCK(status.st_mode)) throw FileError(path_, "is there and is not a socket: move it away");

@@ -21,10 +21,6 @@ class UnixSocket {
   UnixSocket& operator=(const UnixSocket&) = delete;
   ~UnixSocket();
 
-  /// Whether a program listens there, also one that does not let this user in.
-  /// @throws FileError when the path is longer than a Unix socket allows.
-  [[nodiscard]] static bool is_answered(const std::filesystem::path& path);
-
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// The descriptor, still owned by this object.
   [[nodiscard]] int descriptor() const { return fd_; }

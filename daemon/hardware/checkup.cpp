@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
-#include "daemon/api/unix_socket.h"
+#include "daemon/api/client/local_address.h"
 #include "drivers/modbus/endpoint.h"
 
 namespace eigenpose {
@@ -355,7 +355,7 @@ void check_devices(const Devices& devices, const Clock& clock, const std::stop_t
 }
 
 bool is_service_running(const Config& config) {
-  return UnixSocket::is_answered(config.results_socket());
+  return is_answered(config.results_socket());
 }
 
 }  // namespace eigenpose

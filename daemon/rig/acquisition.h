@@ -7,11 +7,11 @@
 #include <stop_token>
 #include <string>
 
-#include "config/plan.h"
 #include "core/base/clock.h"
 #include "core/base/progress.h"
 #include "core/base/workspace.h"
 #include "daemon/rig/frame_hub.h"
+#include "daemon/rig/plan.h"
 #include "daemon/rig/rig.h"
 
 namespace eigenpose {

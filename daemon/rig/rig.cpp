@@ -170,7 +170,7 @@ void Rig::drop(AxisSlot& slot) {
 
 void Rig::Control::move_to(const std::string& name, double position, const std::stop_token& stop) {
   AxisSlot& slot = rig_.slot(name);
-  const AxisOptions& options = slot.setup.options;
+  const RigAxisOptions& options = slot.setup.options;
   try {
     Axis& axis = rig_.open(slot);
     AxisState state = axis.state(rig_.clock_.now() + answer_timeout);

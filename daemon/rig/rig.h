@@ -2,6 +2,7 @@
 
 /// The rig's axes and lamps, on the one thread they live on.
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -15,21 +16,34 @@
 #include <thread>
 #include <vector>
 
-#include "config/config.h"
 #include "core/base/clock.h"
+#include "core/base/workspace.h"
 #include "drivers/axis.h"
 #include "drivers/lamp.h"
 
 namespace eigenpose {
 
-/// How an axis is configured and how it is opened.
+/// What the rig needs to know of an axis, whatever its driver.
+struct RigAxisOptions {
+  Dof dof;                                           ///< name, unit, range, periodic
+  Duration settle = std::chrono::milliseconds(200);  ///< vibration dies out after arrival
+  Duration move_timeout = std::chrono::seconds(30);  ///< of one move, and of homing
+};
+
+/// An axis and how it is opened.
 struct RigAxis {
-  AxisOptions options;
+  RigAxisOptions options;
   std::function<std::unique_ptr<Axis>()> open;
 };
 
+struct RigLampOptions {
+  std::string name;
+  double level = 1.0;  ///< 0…1, set when the lamp is opened
+};
+
+/// A lamp and how it is opened.
 struct RigLamp {
-  LampOptions options;
+  RigLampOptions options;
   std::function<std::unique_ptr<Lamp>()> open;
 };
 

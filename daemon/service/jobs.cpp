@@ -1,11 +1,12 @@
 #include "daemon/service/jobs.h"
 
 #include <charconv>
+#include <system_error>
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "core/base/error.h"
-#include "daemon/api/errors.h"
 
 namespace eigenpose {
 namespace {
@@ -19,6 +20,10 @@ std::uint64_t number_of(const std::string& id) {
 }
 
 }  // namespace
+
+std::string_view job_kind_name(JobKind kind) {
+  return kind == JobKind::acquire ? "acquire" : "learn";
+}
 
 std::string_view job_state_name(JobState state) {
   switch (state) {
@@ -34,19 +39,27 @@ std::string_view job_state_name(JobState state) {
   return "failed";
 }
 
+Jobs::Jobs(EventSink& events)
+    : Jobs(events,
+           [](std::function<void(const std::stop_token&)> body) { return std::jthread(std::move(body)); }) {}
+
+Jobs::Jobs(EventSink& events, StartThread start_thread)
+    : events_(events), start_thread_(std::move(start_thread)) {}
+
 Jobs::~Jobs() {
   const std::lock_guard lock(mutex_);
   for (const auto& [id, job] : jobs_) job->thread.request_stop();
   jobs_.clear();  // joins
 }
 
-JobStatus Jobs::start(const std::string& kind, const std::string& subject, Work work) {
+JobStatus Jobs::start(JobKind kind, const std::string& subject, Work work) {
   const std::lock_guard lock(mutex_);
   for (const auto& [id, job] : jobs_) {
     const std::lock_guard job_lock(job->mutex);
     if (job->status.kind == kind && job->status.state == JobState::running)
-      throw RequestError(409, "job " + job->status.id + " (" + kind + ") is running",
-                         "wait for it, or cancel it: DELETE /v1/jobs/" + job->status.id);
+      throw ServiceError(Fault::busy,
+                         fmt::format("job {} ({}) is running", job->status.id, job_kind_name(kind)),
+                         "wait for it, or cancel job " + job->status.id);
   }
   forget_old();
   const auto job = std::make_shared<Job>();
@@ -55,14 +68,29 @@ JobStatus Jobs::start(const std::string& kind, const std::string& subject, Work 
   job->status.kind = kind;
   job->status.subject = subject;
   job->status.started = std::chrono::system_clock::now();
-  const JobStatus first = job->status;
+  JobStatus first = job->status;
   jobs_[id] = job;
-  job->thread = std::jthread(
-      [raw = job.get(), work = std::move(work)](const std::stop_token& stop) { run(*raw, work, stop); });
+  try {
+    job->thread = start_thread_([this, raw = job.get(), work = std::move(work)](const std::stop_token& stop) {
+      run(*raw, work, stop);
+    });
+  } catch (const std::system_error& error) {
+    end(*job, JobState::failed, {},
+        Failure{Fault::unavailable, std::string("no thread could be started for the job: ") + error.what(),
+                "end other programs or raise the limit of processes, then start it again"});
+    const std::lock_guard job_lock(job->mutex);
+    first = job->status;
+  }
   return first;
 }
 
 void Jobs::run(Job& job, const Work& work, const std::stop_token& stop) {
+  JobStatus started;
+  {
+    const std::lock_guard lock(job.mutex);
+    started = job.status;
+  }
+  events_.publish(JobChanged{std::move(started)});
   Context context;
   context.stop = stop;
   context.progress = [&job](const ProgressUpdate& update) {
@@ -76,33 +104,40 @@ void Jobs::run(Job& job, const Work& work, const std::stop_token& stop) {
     job.extra_hint = std::move(hint);
   };
   JobState state = JobState::done;
-  Trouble trouble;
-  std::string result;
+  std::optional<Failure> failure;
+  JobResult result;
   try {
     result = work(context);
-  } catch (const Interrupted& interrupted) {
+  } catch (const Interrupted&) {
     state = JobState::cancelled;
-    trouble = describe(std::current_exception());
+    failure = failure_of(std::current_exception());
   } catch (...) {
-    // A device that was stopped on request may complain in its own words.
+    // A device that was stopped on request may fail in its own words.
     state = stop.stop_requested() ? JobState::cancelled : JobState::failed;
-    trouble = describe(std::current_exception());
+    failure = failure_of(std::current_exception());
   }
-  const std::lock_guard lock(job.mutex);
-  JobStatus& status = job.status;
-  status.error = trouble.error;
-  status.hint = trouble.hint;
-  if (state != JobState::done && !job.extra_hint.empty())
-    status.hint += (status.hint.empty() ? "" : ". ") + job.extra_hint;
-  status.result = std::move(result);
-  status.ended = std::chrono::system_clock::now();
-  status.state = state;
+  end(job, state, std::move(result), std::move(failure));
+}
+
+void Jobs::end(Job& job, JobState state, JobResult result, std::optional<Failure> failure) {
+  JobStatus status;
+  {
+    const std::lock_guard lock(job.mutex);
+    if (failure && !job.extra_hint.empty())
+      failure->hint += (failure->hint.empty() ? "" : ". ") + job.extra_hint;
+    job.status.failure = std::move(failure);
+    job.status.result = std::move(result);
+    job.status.ended = std::chrono::system_clock::now();
+    job.status.state = state;
+    status = job.status;
+  }
   if (state == JobState::failed)
-    spdlog::error("event=job_failed job={} kind={} subject={} error=\"{}\"", status.id, status.kind,
-                  status.subject, status.error);
+    spdlog::error("event=job_failed job={} kind={} subject={} error=\"{}\"", status.id,
+                  job_kind_name(status.kind), status.subject, status.failure->what);
   else
-    spdlog::info("event=job_{} job={} kind={} subject={}", job_state_name(state), status.id, status.kind,
-                 status.subject);
+    spdlog::info("event=job_{} job={} kind={} subject={}", job_state_name(state), status.id,
+                 job_kind_name(status.kind), status.subject);
+  events_.publish(JobChanged{std::move(status)});
 }
 
 std::optional<JobStatus> Jobs::find(const std::string& id) const {
@@ -123,10 +158,10 @@ std::vector<JobStatus> Jobs::list() const {
   return result;
 }
 
-bool Jobs::running(std::string_view kind) const {
-  for (const JobStatus& job : list())
-    if (job.kind == kind && job.state == JobState::running) return true;
-  return false;
+std::optional<JobStatus> Jobs::running(JobKind kind) const {
+  for (JobStatus& job : list())
+    if (job.kind == kind && job.state == JobState::running) return std::move(job);
+  return std::nullopt;
 }
 
 std::optional<JobStatus> Jobs::cancel(const std::string& id) {

@@ -4,20 +4,16 @@
 #include <map>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <spdlog/spdlog.h>
 
 #include "core/base/error.h"
 #include "core/dataset/image_set.h"
-#include "core/learning/learning.h"
-#include "daemon/api/errors.h"
 #include "daemon/rig/acquisition.h"
 
 namespace eigenpose {
 namespace {
 
-constexpr int jpeg_quality = 85;
+constexpr int max_components = 1024;
 
 /// The complete image sets, or those that are named.
 std::vector<ImageSet> learning_sets(const std::filesystem::path& folder,
@@ -31,107 +27,112 @@ std::vector<ImageSet> learning_sets(const std::filesystem::path& folder,
     if (set.complete())
       sets.push_back(std::move(set));
     else if (is_named)
-      throw RequestError(409, "the image set of \"" + set.object() + "\" is incomplete",
+      throw ServiceError(Fault::conflict, "the image set of \"" + set.object() + "\" is incomplete",
                          "acquire it again: it continues where it was");
     else
       spdlog::warn("event=set_left_out object={} reason=incomplete", set.object());
   }
   if (named < wanted.size())
-    throw RequestError(404, "an object that was named has no image set", "GET /v1/objects lists them");
+    throw ServiceError(Fault::not_found, "an object that was named has no image set",
+                       "ask for the objects there are");
   if (sets.empty())
-    throw RequestError(409, "no image set is complete yet",
-                       "acquire an object first: eigenpose acquire NAME");
+    throw ServiceError(Fault::conflict, "no image set is complete yet", "acquire an object first");
   return sets;
 }
 
-/// @throws ConfigError for an image type that is not known.
-NormalizationOptions normalization_options(const LearnOptions& learn) {
-  NormalizationOptions options;
-  options.size = learn.size;
-  options.color = learn.color;
-  try {
-    if (!learn.type.empty()) set_image_type(options, learn.type);
-  } catch (const std::invalid_argument& wrong) {
-    throw ConfigError(std::string("[learn] type: ") + wrong.what());
-  }
-  return options;
+std::vector<Dof> dofs_of(const std::vector<RigAxis>& axes) {
+  std::vector<Dof> dofs;
+  for (const RigAxis& axis : axes) dofs.push_back(axis.options.dof);
+  return dofs;
 }
 
 }  // namespace
 
-Service::Service(Config config, Devices devices, const Clock& clock)
-    : config_(std::move(config)),
+std::string_view service_state_name(ServiceState state) {
+  switch (state) {
+    case ServiceState::acquiring:
+      return "acquiring";
+    case ServiceState::watching:
+      return "watching";
+    case ServiceState::idle:
+      return "idle";
+  }
+  return "idle";
+}
+
+Service::Service(ServiceOptions options, ServiceDevices devices, EventSink& events, const Clock& clock)
+    : options_(std::move(options)),
       clock_(clock),
-      devices_(std::move(devices)),
-      models_(config_.model_file()),
-      results_(std::make_shared<EventLog>(static_cast<std::size_t>(config_.api.event_buffer))),
-      rig_(std::move(devices_.axes), std::move(devices_.lamps), clock),
-      camera_(std::move(devices_.camera), clock),
-      watcher_(config_.watch, camera_, models_, *results_) {
-  (void)normalization_options(config_.learn);  // a wrong image type stops the start
+      dofs_(dofs_of(devices.axes)),
+      models_(options_.model_file),
+      rig_(std::move(devices.axes), std::move(devices.lamps), clock),
+      camera_(std::move(devices.camera), clock),
+      watcher_(options_.watch, camera_, models_, events),
+      jobs_(events) {
   models_.load();
 }
 
 Service::~Service() = default;
 
-JobStatus Service::acquire(const std::string& object, const Plan& plan) {
-  check_plan(plan, config_.dofs());
-  AcquisitionRequest request{object, plan, plan_workspace(plan, config_.dofs()), config_.image_sets()};
-  return jobs_.start("acquire", object, [this, request = std::move(request)](const Jobs::Context& job) {
-    const Watcher::Pause pause(watcher_);
-    AcquisitionReport report;
-    try {
-      eigenpose::acquire(request, rig_, camera_, clock_, report, job.progress, job.stop);
-    } catch (...) {
-      if (!report.folder.empty())
-        job.add_hint(fmt::format("{} of {} views are kept in {}: the same acquisition continues there",
-                                 report.kept + report.taken, report.total, report.folder.string()));
-      throw;
-    }
-    return nlohmann::json{{"folder", report.folder.string()}, {"views", report.total}, {"kept", report.kept}}
-        .dump();
-  });
+JobStatus Service::acquire(const std::string& object, const PlanRequest& plan) {
+  return start_acquisition(object, make_plan(plan, dofs_));
+}
+
+JobStatus Service::acquire(const std::string& object, const std::string& plan_name) {
+  for (const Plan& plan : options_.plans)
+    if (plan.name == plan_name) return start_acquisition(object, plan);
+  std::string names;
+  for (const Plan& plan : options_.plans) names += (names.empty() ? "" : ", ") + plan.name;
+  throw ServiceError(Fault::not_found, "there is no plan \"" + plan_name + "\"",
+                     names.empty() ? "add a [[plan]] to the configuration" : "plans: " + names);
+}
+
+JobStatus Service::start_acquisition(const std::string& object, Plan plan) {
+  AcquisitionRequest request{object, std::move(plan), {}, options_.image_sets};
+  request.workspace = plan_workspace(request.plan, dofs_);
+  return jobs_.start(
+      JobKind::acquire, object, [this, request = std::move(request)](const Jobs::Context& job) {
+        const Watcher::Pause pause(watcher_);
+        AcquisitionReport report;
+        try {
+          eigenpose::acquire(request, rig_, camera_, clock_, report, job.progress, job.stop);
+        } catch (...) {
+          if (!report.folder.empty())
+            job.add_hint(fmt::format("{} of {} views are kept in {}: the same acquisition continues there",
+                                     report.kept + report.taken, report.total, report.folder.string()));
+          throw;
+        }
+        return AcquisitionResult{report.folder, report.total, report.kept};
+      });
 }
 
 JobStatus Service::learn(const LearnRequest& request) {
-  LearningOptions options;
-  options.normalization = normalization_options(config_.learn);
-  options.solver.components = static_cast<std::size_t>(request.components.value_or(config_.learn.components));
-  options.solver.energy = config_.learn.energy;
-  options.image_sets = config_.image_sets().string();
-  options.program_version = EIGENPOSE_VERSION;
-  return jobs_.start("learn", "", [this, options, wanted = request.objects](const Jobs::Context& job) {
-    const std::vector<ImageSet> sets = learning_sets(config_.image_sets(), wanted);
-    LearningReport report;
-    const auto model = std::make_shared<const Model>(
-        eigenpose::learn(all_views(sets), options, &report, job.progress, job.stop));
-    models_.replace(model);
-    spdlog::info("event=model_learned objects={} views={} components={} energy={:.4f} seconds={:.2f}",
-                 model->objects.size(), report.views, report.solver.components, report.solver.energy,
-                 std::chrono::duration<double>(report.total_time).count());
-    return nlohmann::json{{"objects", model->objects.size()},
-                          {"views", report.views},
-                          {"components", report.solver.components},
-                          {"energy", report.solver.energy},
-                          {"seconds", std::chrono::duration<double>(report.total_time).count()},
-                          {"file", models_.file().string()}}
-        .dump();
-  });
-}
-
-const Plan& Service::plan(const std::string& name) const {
-  for (const Plan& plan : config_.plans)
-    if (plan.name == name) return plan;
-  std::string names;
-  for (const Plan& plan : config_.plans) names += (names.empty() ? "" : ", ") + plan.name;
-  throw RequestError(404, "there is no plan \"" + name + "\"",
-                     names.empty() ? "add a [[plan]] to the configuration" : "plans: " + names);
+  LearningOptions options = options_.learning;
+  if (request.components) {
+    if (*request.components < 1 || *request.components > max_components)
+      throw ServiceError(Fault::invalid_request, fmt::format("components is {}", *request.components),
+                         fmt::format("allowed: 1 to {}", max_components));
+    options.solver.components = static_cast<std::size_t>(*request.components);
+  }
+  return jobs_.start(
+      JobKind::learn, "", [this, options, wanted = request.objects](const Jobs::Context& job) -> JobResult {
+        const std::vector<ImageSet> sets = learning_sets(options_.image_sets, wanted);
+        LearningReport report;
+        const auto model = std::make_shared<const Model>(
+            eigenpose::learn(all_views(sets), options, &report, job.progress, job.stop));
+        models_.replace(model);
+        const LearningResult result{model->objects.size(), report.views,      report.solver.components,
+                                    report.solver.energy,  report.total_time, models_.file()};
+        spdlog::info("event=model_learned objects={} views={} components={} energy={:.4f} seconds={:.2f}",
+                     result.objects, result.views, result.components, result.energy, result.time.count());
+        return result;
+      });
 }
 
 std::vector<ObjectStatus> Service::objects() const {
   std::map<std::string, ObjectStatus> found;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(config_.image_sets(), error)) {
+  for (const auto& entry : std::filesystem::directory_iterator(options_.image_sets, error)) {
     if (!std::filesystem::exists(entry.path() / "set.json")) continue;
     ObjectStatus object;
     object.name = entry.path().filename().string();
@@ -156,22 +157,18 @@ std::vector<ObjectStatus> Service::objects() const {
   return result;
 }
 
-std::string Service::frame_jpeg() const {
-  const std::optional<Frame> frame = camera_.latest();
+Frame Service::newest_frame() const {
+  std::optional<Frame> frame = camera_.latest();
   if (!frame)
-    throw RequestError(503, camera_.status().error.value_or("the camera has not taken a picture yet"),
+    throw ServiceError(Fault::unavailable,
+                       camera_.status().error.value_or("the camera has not taken a picture yet"),
                        "`eigenpose status` shows the camera; try again when it runs");
-  cv::Mat image = frame->image;
-  // JPEG has 8 bits; a 16-bit camera keeps its upper ones.
-  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 256.0);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
-  return {bytes.begin(), bytes.end()};
+  return *std::move(frame);
 }
 
-std::string Service::state() const {
-  if (jobs_.running("acquire")) return "acquiring";
-  return config_.watch.enabled && models_.current() ? "watching" : "idle";
+ServiceState Service::state() const {
+  if (jobs_.running(JobKind::acquire)) return ServiceState::acquiring;
+  return options_.watch.enabled && models_.current() ? ServiceState::watching : ServiceState::idle;
 }
 
 }  // namespace eigenpose

@@ -5,23 +5,11 @@
 
 #include <spdlog/spdlog.h>
 
-#include "daemon/api/result_json.h"
-
 namespace eigenpose {
-namespace {
 
-SceneChangeOptions scene_options(const WatchOptions& options) {
-  SceneChangeOptions scene;
-  scene.settle = options.settle;
-  scene.threshold = options.threshold;
-  return scene;
-}
-
-}  // namespace
-
-Watcher::Watcher(const WatchOptions& options, const FrameHub& camera, const ModelStore& models,
-                 EventLog& results)
-    : camera_(camera), models_(models), results_(results), scene_(scene_options(options)) {
+Watcher::Watcher(const WatcherOptions& options, const FrameHub& camera, const ModelStore& models,
+                 EventSink& events)
+    : camera_(camera), models_(models), events_(events), scene_(options.scene) {
   if (options.enabled) thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
@@ -75,28 +63,29 @@ void Watcher::use_model(std::shared_ptr<const Model> model) {
 
 void Watcher::report_change(const Frame& frame) {
   told_settled_ = false;
-  Result result;
-  result.state = Result::State::changing;
-  result.frame = &frame;
-  results_.publish([&](std::uint64_t sequence) { return result_json(result, sequence); });
+  SceneResult result;
+  result.state = SceneResult::State::changing;
+  result.frame = {frame.sequence, frame.exposure_start};
+  result.time = std::chrono::system_clock::now();
+  events_.publish(result);
 }
 
 void Watcher::report_settled(const Frame& frame) {
-  // Whatever happens below, this scene has been looked at: a failure is told once, not thirty times a second.
+  // Whatever happens below, this scene has been looked at: a failure is reported once, not with every frame.
   scene_.accept();
   told_settled_ = true;
   fresh_model_ = false;
+  SceneResult result;
+  result.frame = {frame.sequence, frame.exposure_start};
+  result.model = model_;
   RecognitionTimes times;
-  Result result;
-  result.state = Result::State::settled;
-  result.frame = &frame;
-  result.model = model_.get();
-  result.outcomes = recognizer_->recognize(frame.image, &times);
+  const std::span<const Outcome> outcomes = recognizer_->recognize(frame.image, &times);
+  result.outcomes.assign(outcomes.begin(), outcomes.end());
   result.times = times;
-  const std::uint64_t number =
-      results_.publish([&](std::uint64_t sequence) { return result_json(result, sequence); });
-  spdlog::info("event=result sequence={} regions={} {}", number, result.outcomes.size(),
-               result_words(result));
+  result.time = std::chrono::system_clock::now();
+  spdlog::info("event=result frame={} regions={} {}", frame.sequence, result.outcomes.size(),
+               log_text(result));
+  events_.publish(std::move(result));
   const std::lock_guard lock(mutex_);
   ++status_.recognitions;
   status_.error.reset();

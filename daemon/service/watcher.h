@@ -11,14 +11,18 @@
 #include <string>
 #include <thread>
 
-#include "config/config.h"
 #include "core/image/scene_change.h"
 #include "core/recognition/recognizer.h"
-#include "daemon/api/event_log.h"
 #include "daemon/rig/frame_hub.h"
+#include "daemon/service/events.h"
 #include "daemon/service/model_store.h"
 
 namespace eigenpose {
+
+struct WatcherOptions {
+  bool enabled = true;
+  SceneChangeOptions scene;  ///< when a picture counts as settled
+};
 
 /// Counts since the start.
 struct WatchStatus {
@@ -32,8 +36,8 @@ struct WatchStatus {
 /// Nothing is published without a model, nor while paused. Thread-safe.
 class Watcher {
  public:
-  /// Starts the thread. All arguments outlive the watcher.
-  Watcher(const WatchOptions& options, const FrameHub& camera, const ModelStore& models, EventLog& results);
+  /// Starts the thread, if enabled. Camera, models and events outlive the watcher.
+  Watcher(const WatcherOptions& options, const FrameHub& camera, const ModelStore& models, EventSink& events);
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
   ~Watcher();
@@ -61,7 +65,7 @@ class Watcher {
 
   const FrameHub& camera_;
   const ModelStore& models_;
-  EventLog& results_;
+  EventSink& events_;
   std::atomic<int> pauses_{0};
   mutable std::mutex mutex_;
   WatchStatus status_;  ///< guarded by mutex_

@@ -96,17 +96,25 @@ TEST(Config, AnEndpointThatIsNotUnderstoodIsRefused) {
               AllOf(StartsWith("rig.toml:4: "), HasSubstr("tcp://HOST:PORT")));
 }
 
-TEST(Config, APlanNamesAxesThatExistAndPositionsTheyReach) {
+TEST(Config, APlanIsKeptAsItIsWrittenWithItsPlace) {
   const std::string plan = axis + "[[plan]]\nname = \"p\"\n[[plan.axis]]\n";
-  EXPECT_THAT(refusal(plan + "axis = \"slide\"\nat = [0]\n"),
-              AllOf(StartsWith("rig.toml:8: "), HasSubstr("slide")));
-  EXPECT_THAT(refusal(plan + "axis = \"table\"\nat = [400]\n"), HasSubstr("allowed: 0 to 360"));
   EXPECT_THAT(refusal(plan + "axis = \"table\"\n"), HasSubstr("either at"));
   EXPECT_THAT(refusal(plan + "axis = \"table\"\nfrom = 0\nto = 360\ncount = 36\nat = [0]\n"),
               HasSubstr("either at"));
-  const Config config = parse_config(plan + "axis = \"table\"\nfrom = 0\nto = 360\ncount = 36\n", "rig.toml");
+  const Config config = parse_config(
+      plan + "axis = \"table\"\nfrom = -10\nto = 360\ncount = 36\n[[plan.axis]]\naxis = \"x\"\nat = [1, 2]\n",
+      "rig.toml");
   ASSERT_EQ(config.plans.size(), 1U);
-  EXPECT_EQ(config.plans[0].size(), 36U);
+  EXPECT_THAT(config.plans[0].place, StartsWith("rig.toml:"));
+  ASSERT_EQ(config.plans[0].axes.size(), 2U);
+  const PlanAxisOptions& spaced = config.plans[0].axes[0];
+  EXPECT_TRUE(spaced.spaced);
+  EXPECT_EQ(spaced.axis, "table");
+  EXPECT_EQ(spaced.from, -10.0);
+  EXPECT_EQ(spaced.to, 360.0);
+  EXPECT_EQ(spaced.count, 36);
+  EXPECT_FALSE(config.plans[0].axes[1].spaced);
+  EXPECT_EQ(config.plans[0].axes[1].at, (std::vector<double>{1.0, 2.0}));
 }
 
 TEST(Config, AnAptAxisNamesAStageThatIsKnown) {

@@ -7,11 +7,12 @@
 #include <mutex>
 #include <optional>
 #include <string>
-
-#include <nlohmann/json.hpp>
+#include <variant>
 
 #include "config/config.h"
 #include "core/base/clock.h"
+#include "daemon/composition.h"
+#include "daemon/devices.h"
 #include "daemon/service/service.h"
 #include "sim/lab/lab_client.h"
 #include "tests/support/temporary_folder.h"
@@ -20,21 +21,18 @@ namespace eigenpose {
 
 /// Starts the service with a configuration to which the folders of the test are added. What the test waits
 /// for comes from the service itself; only ctest's own limit ends a wait for something that never comes.
-class LabService {
+class LabService final : public EventSink {
  public:
   explicit LabService(const std::string& configuration)
       : config_(parse_config("[daemon]\nruntime_dir = \"run\"\nstate_dir = \"state\"\n" + configuration,
                              folder_.path() / "rig.toml")) {
     std::filesystem::create_directories(config_.daemon.runtime_dir);
     std::filesystem::create_directories(config_.daemon.state_dir);
-    service_ = std::make_unique<Service>(config_, make_devices(config_, clock_), clock_);
-    service_->results()->on_publish([this] {
-      const std::lock_guard lock(mutex_);
-      published_.notify_all();
-    });
+    const Devices devices = make_devices(config_, clock_);
+    service_ = std::make_unique<Service>(
+        service_options(config_), ServiceDevices{devices.camera, devices.axes, devices.lamps}, *this, clock_);
     if (config_.sim) lab_ = std::make_unique<sim::LabClient>(config_.lab_socket());
   }
-  ~LabService() { service_->results()->on_publish({}); }
   LabService(const LabService&) = delete;
   LabService& operator=(const LabService&) = delete;
 
@@ -61,38 +59,40 @@ class LabService {
   JobStatus acquire(const std::string& object) {
     lab_->clear();
     lab_->place(object);
-    return ended(service_->acquire(object, service_->plan("default")).id);
+    return ended(service_->acquire(object, "default").id);
   }
   JobStatus learn() { return ended(service_->learn({}).id); }
 
   /// The first settled result of a frame exposed after `since`.
-  nlohmann::json settled_after(TimePoint since) {
-    const double since_s = std::chrono::duration<double>(since.time_since_epoch()).count();
+  SceneResult settled_after(TimePoint since) {
     std::unique_lock lock(mutex_);
-    nlohmann::json result;
-    published_.wait(lock, [&] {
-      const auto latest = service_->results()->latest();
-      if (!latest) return false;
-      result = nlohmann::json::parse(*latest->data);
-      return result.at("state") == "settled" && result.at("exposure_monotonic_s").get<double>() > since_s;
-    });
-    return result;
+    published_.wait(lock, [&] { return settled_ && settled_->frame.exposure_start > since; });
+    return *settled_;
   }
-  /// What the service says of the table after `change`.
+  /// What the service reports of the table after `change`.
   template <typename Change>
-  nlohmann::json seen_after(Change change) {
+  SceneResult seen_after(Change change) {
     change();
     return settled_after(clock_.now());
   }
 
  private:
+  void publish(const Event& event) noexcept override {
+    const auto* result = std::get_if<SceneResult>(&event);
+    if (result == nullptr || result->state != SceneResult::State::settled) return;
+    const std::lock_guard lock(mutex_);
+    settled_ = *result;
+    published_.notify_all();
+  }
+
   test::TemporaryFolder folder_;
   SteadyClock clock_;
   Config config_;
-  std::unique_ptr<Service> service_;
-  std::unique_ptr<sim::LabClient> lab_;
   std::mutex mutex_;
   std::condition_variable published_;
+  std::optional<SceneResult> settled_;  ///< guarded by mutex_: the newest
+  std::unique_ptr<Service> service_;
+  std::unique_ptr<sim::LabClient> lab_;
 };
 
 }  // namespace eigenpose

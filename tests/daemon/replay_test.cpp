@@ -39,10 +39,10 @@ TEST(Replay, LearnsTheEvenViewsOfRealObjectsAndRecognisesTheOddOnes) {
   while (!lab.service().camera().latest()) std::this_thread::yield();
   for (int object = 1; object <= objects; ++object) {
     const JobStatus job = lab.acquire("obj" + std::to_string(object));
-    ASSERT_EQ(job.state, JobState::done) << job.error;
+    ASSERT_EQ(job.state, JobState::done) << job.failure.value_or(Failure{}).what;
   }
   const JobStatus learned = lab.learn();
-  ASSERT_EQ(learned.state, JobState::done) << learned.error;
+  ASSERT_EQ(learned.state, JobState::done) << learned.failure.value_or(Failure{}).what;
 
   int watched = 0;
   int right = 0;
@@ -53,22 +53,20 @@ TEST(Replay, LearnsTheEvenViewsOfRealObjectsAndRecognisesTheOddOnes) {
     const std::string name = "obj" + std::to_string(object);
     for (int view = 1; view < views; view += watched_step()) {
       const double angle_deg = 5.0 * view;
-      const nlohmann::json result = lab.seen_after([&] {
+      const SceneResult result = lab.seen_after([&] {
         lab.lab().clear();
         lab.lab().place(name, degrees(angle_deg));
       });
       ++watched;
-      const nlohmann::json& outcomes = result.at("outcomes");
-      std::vector<nlohmann::json> recognized;
-      for (const nlohmann::json& outcome : outcomes)
-        if (outcome.at("verdict") == "recognized") recognized.push_back(outcome);
-      const bool is_right = recognized.size() == 1 && recognized[0].at("object") == name;
-      strays += static_cast<int>(outcomes.size() - recognized.size());
-      if (!is_right) std::printf("%s at %.0f deg: %s\n", name.c_str(), angle_deg, outcomes.dump().c_str());
+      std::vector<Hypothesis> recognized;
+      for (const Outcome& outcome : result.outcomes)
+        if (outcome.verdict == Verdict::recognized) recognized.push_back(*outcome.best);
+      const bool is_right = recognized.size() == 1 && recognized[0].object == name;
+      strays += static_cast<int>(result.outcomes.size() - recognized.size());
+      if (!is_right) std::printf("%s at %.0f deg: %s\n", name.c_str(), angle_deg, log_text(result).c_str());
       if (!is_right) continue;
       ++right;
-      errors_deg.push_back(std::abs(
-          circular_difference(recognized[0].at("pose").at("table_deg").get<double>(), angle_deg, 360.0)));
+      errors_deg.push_back(std::abs(circular_difference(recognized[0].q[0], angle_deg, 360.0)));
     }
   }
   double mean = 0.0;

@@ -41,6 +41,10 @@ std::string table_at(const std::string& endpoint) {
   return "[[axis]]\nname = \"table\"\ndriver = \"modbus\"\nsettle_ms = 10\nendpoint = \"" + endpoint + "\"\n";
 }
 
+std::string error_of(const JobStatus& job) {
+  return job.failure.value_or(Failure{}).what;
+}
+
 bool has_part_files(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
     if (entry.path().string().find(".part") != std::string::npos) return true;
@@ -51,27 +55,26 @@ bool has_part_files(const std::filesystem::path& folder) {
 void learn_duck_and_car(LabService& lab) {
   for (const char* object : {"duck", "car"}) {
     const JobStatus job = lab.acquire(object);
-    ASSERT_EQ(job.state, JobState::done) << job.error;
+    ASSERT_EQ(job.state, JobState::done) << error_of(job);
     EXPECT_EQ(job.total, 24U);
   }
   const JobStatus learned = lab.learn();
-  ASSERT_EQ(learned.state, JobState::done) << learned.error;
+  ASSERT_EQ(learned.state, JobState::done) << error_of(learned);
 }
 
 /// Puts them on the table one after the other, turned between two learned poses, which are 15 degrees apart.
 void expect_duck_and_car_recognized(LabService& lab) {
   constexpr double pose_bound_deg = 5.0;  // small pictures, so a coarse bound
   for (const auto& [object, yaw_deg] : {std::pair{"duck", 52.0}, {"car", 203.0}}) {
-    const nlohmann::json result = lab.seen_after([&] {
+    const SceneResult result = lab.seen_after([&, object = object, yaw_deg = yaw_deg] {
       lab.lab().clear();
       lab.lab().place(object, degrees(yaw_deg));
     });
-    ASSERT_EQ(result.at("outcomes").size(), 1U) << result.dump();
-    const nlohmann::json& outcome = result.at("outcomes")[0];
-    EXPECT_EQ(outcome.at("verdict"), "recognized") << result.dump();
-    EXPECT_EQ(outcome.at("object"), object);
-    EXPECT_LT(std::abs(circular_difference(outcome.at("pose").at("table_deg").get<double>(), yaw_deg, 360.0)),
-              pose_bound_deg);
+    ASSERT_EQ(result.outcomes.size(), 1U) << log_text(result);
+    const Outcome& outcome = result.outcomes[0];
+    ASSERT_EQ(outcome.verdict, Verdict::recognized) << log_text(result);
+    EXPECT_EQ(outcome.best->object, object);
+    EXPECT_LT(std::abs(circular_difference(outcome.best->q[0], yaw_deg, 360.0)), pose_bound_deg);
   }
 }
 
@@ -80,12 +83,12 @@ TEST(SimulatedLab, AcquiresLearnsAndSaysWhatStandsThereAndHowItIsTurned) {
   ASSERT_NO_FATAL_FAILURE(learn_duck_and_car(lab));
   EXPECT_TRUE(std::filesystem::exists(lab.config().model_file()));
   ASSERT_NO_FATAL_FAILURE(expect_duck_and_car_recognized(lab));
-  const nlohmann::json empty = lab.seen_after([&] { lab.lab().clear(); });
-  EXPECT_TRUE(empty.at("outcomes").empty()) << "an empty table is no object: " << empty.dump();
+  const SceneResult empty = lab.seen_after([&] { lab.lab().clear(); });
+  EXPECT_TRUE(empty.outcomes.empty()) << "an empty table is no object: " << log_text(empty);
 
-  const nlohmann::json hand = lab.seen_after([&] { lab.lab().hand(true); });
-  for (const nlohmann::json& outcome : hand.at("outcomes"))
-    EXPECT_NE(outcome.at("verdict"), "recognized") << "a hand is no object: " << hand.dump();
+  const SceneResult hand = lab.seen_after([&] { lab.lab().hand(true); });
+  for (const Outcome& outcome : hand.outcomes)
+    EXPECT_NE(outcome.verdict, Verdict::recognized) << "a hand is no object: " << log_text(hand);
   EXPECT_FALSE(has_part_files(lab.config().daemon.state_dir));
 }
 
@@ -101,9 +104,9 @@ TEST(SimulatedLab, AnAbsentModbusServerEndsInAClearErrorAndNothingIsLost) {
   LabService lab(small_lab + table_at("tcp://127.0.0.1:1"));
   const JobStatus job = lab.acquire("duck");
   EXPECT_EQ(job.state, JobState::failed);
-  EXPECT_THAT(job.error, HasSubstr("table"));
-  EXPECT_THAT(job.error, HasSubstr("127.0.0.1:1"));
-  EXPECT_THAT(job.hint, HasSubstr("has power and its cable"));
+  EXPECT_THAT(error_of(job), HasSubstr("table"));
+  EXPECT_THAT(error_of(job), HasSubstr("127.0.0.1:1"));
+  EXPECT_THAT(job.failure->hint, HasSubstr("has power and its cable"));
   EXPECT_THAT(lab.service().rig().status()[0].error.value_or(""), HasSubstr("table"));
 }
 
@@ -111,13 +114,13 @@ TEST(SimulatedLab, AModbusServerThatDiesInTheMiddleLosesNothingAndTheAcquisition
   LabService lab(small_lab + table_at("simulated"));
   lab.lab().clear();
   lab.lab().place("duck");
-  const std::string id = lab.service().acquire("duck", lab.service().plan("default")).id;
+  const std::string id = lab.service().acquire("duck", "default").id;
   ASSERT_EQ(lab.done_steps(id, 3).state, JobState::running);
   lab.lab().request(R"({"do": "modbus", "alive": false})");
   const JobStatus broken = lab.ended(id);
   EXPECT_EQ(broken.state, JobState::failed);
-  EXPECT_THAT(broken.error, HasSubstr("table"));
-  EXPECT_THAT(broken.hint, HasSubstr("of 24 views are kept"));
+  EXPECT_THAT(error_of(broken), HasSubstr("table"));
+  EXPECT_THAT(broken.failure->hint, HasSubstr("of 24 views are kept"));
   const ImageSet partial = ImageSet::open(lab.config().image_sets() / "duck");
   EXPECT_GE(partial.views().size(), 3U);
   EXPECT_FALSE(partial.complete());
@@ -127,7 +130,7 @@ TEST(SimulatedLab, AModbusServerThatDiesInTheMiddleLosesNothingAndTheAcquisition
 
   lab.lab().request(R"({"do": "modbus", "alive": true})");
   const JobStatus continued = lab.acquire("duck");
-  EXPECT_EQ(continued.state, JobState::done) << continued.error;
+  EXPECT_EQ(continued.state, JobState::done) << error_of(continued);
   const ImageSet whole = ImageSet::open(lab.config().image_sets() / "duck");
   EXPECT_EQ(whole.views().size(), 24U);
   EXPECT_TRUE(whole.complete());
@@ -137,7 +140,7 @@ TEST(SimulatedLab, CancellingStopsTheTableAndKeepsWhatWasTaken) {
   LabService lab(small_lab + table_at("simulated"));
   lab.lab().clear();
   lab.lab().place("duck");
-  const std::string id = lab.service().acquire("duck", lab.service().plan("default")).id;
+  const std::string id = lab.service().acquire("duck", "default").id;
   lab.done_steps(id, 2);
   ASSERT_TRUE(lab.service().jobs().cancel(id));
   EXPECT_EQ(lab.ended(id).state, JobState::cancelled);
@@ -152,7 +155,7 @@ TEST(SimulatedLab, LearningWithoutACompleteSetSaysToAcquireFirst) {
   LabService lab(small_lab + table_at("simulated"));
   const JobStatus job = lab.learn();
   EXPECT_EQ(job.state, JobState::failed);
-  EXPECT_FALSE(job.error.empty());
+  EXPECT_THAT(error_of(job), HasSubstr(lab.config().image_sets().string()));
 }
 
 TEST(SimulatedLab, ADamagedModelIsToldAndLeftWhereItIs) {

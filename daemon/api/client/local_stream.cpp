@@ -10,10 +10,10 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "daemon/api/client/local_address.h"
 
 namespace eigenpose {
 namespace {
@@ -25,13 +25,7 @@ boost::system::error_code last_error() {
 }  // namespace
 
 LocalStream::LocalStream(const std::filesystem::path& socket) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::string path = socket.string();
-  if (path.size() >= sizeof address.sun_path)
-    throw FileError(socket, "this path is longer than the " + std::to_string(sizeof address.sun_path - 1) +
-                                " bytes a Unix socket may have: use a shorter one");
-  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  const sockaddr_un address = local_address(socket);
   socket_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   // The kernel takes or refuses a local connection at once.
   const bool connected =

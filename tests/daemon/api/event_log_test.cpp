@@ -1,6 +1,8 @@
 #include "daemon/api/event_log.h"
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -49,13 +51,36 @@ TEST(EventLog, ANumberFromAFormerRunBeginsAnew) {
   EXPECT_EQ(log.after(1000)->sequence, 1U);
 }
 
-TEST(EventLog, TellsItsListenerAfterEachEvent) {
+TEST(EventLog, CallsEveryListenerAfterEachEvent) {
   EventLog log(3);
-  int told = 0;
-  log.on_publish([&] { told += log.last_sequence() > 0 ? 1 : 0; });
+  std::vector<std::uint64_t> first, second;
+  const auto one = log.subscribe([&] { first.push_back(log.last_sequence()); });
+  const auto two = log.subscribe([&] { second.push_back(log.last_sequence()); });
   publish(log);
   publish(log);
-  EXPECT_EQ(told, 2);
+  EXPECT_EQ(first, (std::vector<std::uint64_t>{1, 2}));
+  EXPECT_EQ(second, first);
+}
+
+TEST(EventLog, AListenerIsNotCalledAfterItsSubscriptionHasEnded) {
+  EventLog log(3);
+  int calls = 0;
+  EventLog::Subscription kept;
+  {
+    EventLog::Subscription moved = log.subscribe([&] { ++calls; });
+    publish(log);
+    kept = std::move(moved);
+  }
+  publish(log);
+  EXPECT_EQ(calls, 2) << "a subscription that was moved goes on";
+  kept = {};
+  publish(log);
+  EXPECT_EQ(calls, 2);
+  {
+    const auto brief = log.subscribe([&] { ++calls; });
+  }
+  publish(log);
+  EXPECT_EQ(calls, 2);
 }
 
 }  // namespace

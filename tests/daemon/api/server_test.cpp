@@ -75,11 +75,10 @@ class ServerTest : public testing::Test {
       if (request.path == "/events") return EventStream{log_, "result", 0};
       return Response{200, "text/plain", "hello from " + request.path + " " + request.body, {}};
     });
-    log_->on_publish([this] { server_->notify(); });
+    wake_ = log_->subscribe([this] { server_->notify(); });
     server_->listen(socket_, Access::read);
     server_->start();
   }
-  void TearDown() override { log_->on_publish({}); }
   void publish(const std::string& text = "{}") {
     log_->publish([&](std::uint64_t) { return text; });
   }
@@ -103,6 +102,7 @@ class ServerTest : public testing::Test {
   UnixSocket socket_{folder_.path() / "s.sock", 0600, ""};
   std::shared_ptr<EventLog> log_ = std::make_shared<EventLog>(8);
   std::unique_ptr<Server> server_;
+  EventLog::Subscription wake_;
 };
 
 TEST_F(ServerTest, AnswersSeveralRequestsOnOneConnection) {
@@ -242,7 +242,7 @@ TEST_F(ServerTest, StopsWithClientsConnected) {
   half.send(get_hello);
   half.read_until("/hello");  // it has been let in
   half.send("GET / HT");
-  log_->on_publish({});
+  wake_ = {};
   server_.reset();
   EXPECT_EQ(half.read_all(), "");
 }

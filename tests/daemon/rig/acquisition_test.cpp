@@ -22,7 +22,7 @@ const Dof arm{"arm", "deg", -90.0, 90.0, false};
 constexpr std::chrono::milliseconds settle{15};
 
 RigAxis fake(const Dof& dof, FakeAxisRecord& record, const Clock& clock) {
-  AxisOptions options;
+  RigAxisOptions options;
   options.dof = dof;
   options.settle = settle;
   return {options, [&record, dof, &clock] { return std::make_unique<FakeAxis>(dof, record, clock); }};
@@ -30,14 +30,13 @@ RigAxis fake(const Dof& dof, FakeAxisRecord& record, const Clock& clock) {
 
 class AcquisitionTest : public testing::Test {
  protected:
-  AcquisitionRequest request(const std::string& object, std::vector<PlanAxis> axes) {
+  AcquisitionRequest request(const std::string& object, std::vector<PlanAxisRequest> axes) {
     const std::vector<Dof> dofs = {table, arm};
-    Plan plan{"test", std::move(axes)};
-    check_plan(plan, dofs);
+    const Plan plan = make_plan({"test", std::move(axes)}, dofs);
     return {object, plan, plan_workspace(plan, dofs), folder_.path()};
   }
   AcquisitionRequest turn(const std::string& object) {
-    return request(object, {{"table", spaced_positions(table, 0, 360, 6)}});
+    return request(object, {{"table", {}, Spacing{0, 360, 6}}});
   }
   AcquisitionReport run(const AcquisitionRequest& what, std::stop_token stop = {}) {
     AcquisitionReport report;
@@ -80,7 +79,7 @@ TEST_F(AcquisitionTest, ReturnsToTheFirstPoseAtTheEnd) {
 }
 
 TEST_F(AcquisitionTest, CoversTheGridOfTwoAxesAndMovesOnlyWhatChanges) {
-  run(request("mug", {{"arm", {-30, 30}}, {"table", {0, 120, 240}}}));
+  run(request("mug", {{"arm", {-30, 30}, {}}, {"table", {0, 120, 240}, {}}}));
   const ImageSet set = ImageSet::open(folder_.path() / "mug");
   ASSERT_EQ(set.views().size(), 6U);
   EXPECT_THAT(set.views()[4].q, ElementsAre(30, 120));
@@ -163,7 +162,7 @@ TEST_F(AcquisitionTest, WithoutACameraNothingIsTakenAndTheErrorSaysWhatToDo) {
 TEST(RigTest, AnAxisThatCannotBeOpenedIsToldAndDoesNotStopTheOthers) {
   SteadyClock clock;
   FakeAxisRecord record;
-  AxisOptions broken;
+  RigAxisOptions broken;
   broken.dof = arm;
   Rig rig({{broken, []() -> std::unique_ptr<Axis> { throw DeviceLost("arm", "open", "not there"); }},
            fake(table, record, clock)},

@@ -4,17 +4,41 @@
 #include <future>
 #include <mutex>
 #include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
-#include "daemon/api/errors.h"
 
 namespace eigenpose {
 namespace {
 
 using testing::HasSubstr;
+
+/// Keeps the job events it is given.
+class JobEvents final : public EventSink {
+ public:
+  void publish(const Event& event) noexcept override {
+    const auto* changed = std::get_if<JobChanged>(&event);
+    const std::lock_guard lock(mutex_);
+    if (changed != nullptr) seen_.push_back(changed->job);
+    changed_.notify_all();
+  }
+  /// Waits until so many have come.
+  std::vector<JobStatus> first(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return seen_.size() >= count; });
+    return seen_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<JobStatus> seen_;
+};
 
 /// Blocks until the job is asked to stop.
 void wait_for_stop(const std::stop_token& stop) {
@@ -33,99 +57,159 @@ JobStatus ended(const Jobs& jobs, const std::string& id) {
   }
 }
 
-TEST(Jobs, RunsWorkAndKeepsItsResult) {
-  Jobs jobs;
-  const JobStatus first = jobs.start("learn", "", [](const Jobs::Context&) { return R"({"views":36})"; });
+class JobsTest : public testing::Test {
+ protected:
+  JobEvents events_;
+  Jobs jobs_{events_};
+};
+
+TEST_F(JobsTest, RunsWorkAndKeepsItsResult) {
+  const JobStatus first = jobs_.start(JobKind::learn, "", [](const Jobs::Context&) {
+    return AcquisitionResult{"/sets/mug", 36, 4};
+  });
   EXPECT_EQ(first.state, JobState::running);
-  const JobStatus job = ended(jobs, first.id);
+  const JobStatus job = ended(jobs_, first.id);
   EXPECT_EQ(job.state, JobState::done);
-  EXPECT_EQ(job.result, R"({"views":36})");
+  const auto& result = std::get<AcquisitionResult>(job.result);
+  EXPECT_EQ(result.folder, "/sets/mug");
+  EXPECT_EQ(result.views, 36U);
+  EXPECT_EQ(result.kept, 4U);
+  EXPECT_FALSE(job.failure);
   EXPECT_TRUE(job.ended);
 }
 
-TEST(Jobs, ShowsProgressWhileItRuns) {
-  Jobs jobs;
+TEST_F(JobsTest, ShowsProgressWhileItRuns) {
   std::promise<void> shown;
-  const auto id = jobs.start("learn", "",
+  const auto id = jobs_
+                      .start(JobKind::learn, "",
                              [&](const Jobs::Context& job) {
                                job.progress({"normalising", 3, 36});
                                shown.set_value();
                                wait_for_stop(job.stop);
-                               return "{}";
+                               return JobResult();
                              })
                       .id;
   shown.get_future().wait();
-  const JobStatus job = jobs.find(id).value();
+  const JobStatus job = jobs_.find(id).value();
   EXPECT_EQ(job.stage, "normalising");
   EXPECT_EQ(job.done, 3U);
   EXPECT_EQ(job.total, 36U);
 }
 
-TEST(Jobs, RefusesASecondOfItsKindButNotAnother) {
-  Jobs jobs;
+TEST_F(JobsTest, RefusesASecondOfItsKindButNotAnother) {
   const auto block = [](const Jobs::Context& job) {
     wait_for_stop(job.stop);
-    return std::string("{}");
+    return JobResult();
   };
-  jobs.start("acquire", "mug", block);
+  jobs_.start(JobKind::acquire, "mug", block);
   try {
-    jobs.start("acquire", "duck", block);
+    jobs_.start(JobKind::acquire, "duck", block);
     FAIL() << "accepted";
-  } catch (const RequestError& error) {
-    EXPECT_EQ(error.status(), 409);
-    EXPECT_THAT(error.hint(), HasSubstr("DELETE /v1/jobs/1"));
+  } catch (const ServiceError& error) {
+    EXPECT_EQ(error.fault(), Fault::busy);
+    EXPECT_THAT(error.hint(), HasSubstr("cancel job 1"));
   }
-  EXPECT_NO_THROW(jobs.start("learn", "", block));
+  EXPECT_NO_THROW(jobs_.start(JobKind::learn, "", block));
 }
 
-TEST(Jobs, CancelAsksTheWorkToStopAndItEndsAsCancelled) {
-  Jobs jobs;
-  const auto id = jobs.start("acquire", "mug",
-                             [](const Jobs::Context& job) -> std::string {
+TEST_F(JobsTest, CancelAsksTheWorkToStopAndItEndsAsCancelled) {
+  const auto id = jobs_
+                      .start(JobKind::acquire, "mug",
+                             [](const Jobs::Context& job) -> JobResult {
                                wait_for_stop(job.stop);
                                throw Interrupted();
                              })
                       .id;
-  ASSERT_TRUE(jobs.cancel(id));
-  EXPECT_EQ(ended(jobs, id).state, JobState::cancelled);
+  ASSERT_TRUE(jobs_.cancel(id));
+  EXPECT_EQ(ended(jobs_, id).state, JobState::cancelled);
 }
 
-TEST(Jobs, AFailureSaysWhatHappenedAndWhatToDo) {
-  Jobs jobs;
-  const auto id = jobs.start("acquire", "mug",
-                             [](const Jobs::Context& job) -> std::string {
+TEST_F(JobsTest, AFailureSaysWhatHappenedAndWhatToDo) {
+  const auto id = jobs_
+                      .start(JobKind::acquire, "mug",
+                             [](const Jobs::Context& job) -> JobResult {
                                job.add_hint("2 of 36 views are kept");
                                throw DeviceLost("table", "move to 30 deg", "connection closed");
                              })
                       .id;
-  const JobStatus job = ended(jobs, id);
+  const JobStatus job = ended(jobs_, id);
   EXPECT_EQ(job.state, JobState::failed);
-  EXPECT_EQ(job.error, "table: move to 30 deg: connection closed");
-  EXPECT_THAT(job.hint, HasSubstr("power"));
-  EXPECT_THAT(job.hint, HasSubstr("2 of 36 views are kept"));
+  EXPECT_EQ(job.failure->fault, Fault::device);
+  EXPECT_EQ(job.failure->what, "table: move to 30 deg: connection closed");
+  EXPECT_THAT(job.failure->hint, HasSubstr("power"));
+  EXPECT_THAT(job.failure->hint, HasSubstr("2 of 36 views are kept"));
 }
 
-TEST(Jobs, EndsWhatRunsWhenItEndsItself) {
+TEST_F(JobsTest, EndsWhatRunsWhenItEndsItself) {
   std::atomic<bool> stopped{false};
   {
-    Jobs jobs;
-    jobs.start("acquire", "mug", [&](const Jobs::Context& job) {
+    Jobs jobs(events_);
+    jobs.start(JobKind::acquire, "mug", [&](const Jobs::Context& job) {
       wait_for_stop(job.stop);
       stopped = true;
-      return "{}";
+      return JobResult();
     });
   }
   EXPECT_TRUE(stopped);
 }
 
-TEST(Jobs, RemembersTheLastHundred) {
-  Jobs jobs;
+TEST_F(JobsTest, PublishesTheStartAndTheEndOfEachJobInThisOrder) {
+  const auto id = jobs_.start(JobKind::learn, "", [](const Jobs::Context&) { return JobResult(); }).id;
+  const std::vector<JobStatus> seen = events_.first(2);
+  EXPECT_EQ(seen[0].id, id);
+  EXPECT_EQ(seen[0].state, JobState::running);
+  EXPECT_EQ(seen[1].state, JobState::done);
+  EXPECT_TRUE(seen[1].ended);
+}
+
+TEST_F(JobsTest, AnErrorOfADeviceThatWasStoppedOnRequestEndsAsCancelled) {
+  const auto id = jobs_
+                      .start(JobKind::acquire, "mug",
+                             [](const Jobs::Context& job) -> JobResult {
+                               wait_for_stop(job.stop);
+                               throw DeviceError("table", "move to 30 deg", "stopped on the way");
+                             })
+                      .id;
+  jobs_.cancel(id);
+  const JobStatus job = ended(jobs_, id);
+  EXPECT_EQ(job.state, JobState::cancelled);
+  EXPECT_THAT(job.failure->what, HasSubstr("stopped on the way"));
+}
+
+TEST_F(JobsTest, ADefectOfTheProgramIsNotBlamedOnTheCaller) {
+  const auto id =
+      jobs_
+          .start(JobKind::learn, "",
+                 [](const Jobs::Context&) -> JobResult { throw std::out_of_range("vector::_M_range_check"); })
+          .id;
+  EXPECT_EQ(ended(jobs_, id).failure->fault, Fault::internal);
+}
+
+TEST_F(JobsTest, AJobWhoseThreadCannotStartIsFailedAndBlocksNoOther) {
+  bool full = true;
+  Jobs jobs(events_, [&](std::function<void(const std::stop_token&)> body) {
+    if (full) throw std::system_error(EAGAIN, std::generic_category());
+    return std::jthread(std::move(body));
+  });
+  const auto work = [](const Jobs::Context&) { return JobResult(); };
+  const JobStatus job = jobs.start(JobKind::learn, "", work);
+  EXPECT_EQ(job.state, JobState::failed);
+  EXPECT_THAT(job.failure->what, HasSubstr("no thread"));
+  EXPECT_TRUE(job.ended);
+  EXPECT_EQ(jobs.find(job.id)->state, JobState::failed);
+  EXPECT_FALSE(jobs.running(JobKind::learn));
+  EXPECT_EQ(events_.first(1)[0].state, JobState::failed);
+  full = false;
+  EXPECT_EQ(ended(jobs, jobs.start(JobKind::learn, "", work).id).state, JobState::done);
+}
+
+TEST_F(JobsTest, RemembersTheLastHundred) {
   for (int i = 0; i < 150; ++i)
-    ended(jobs, jobs.start("learn", "", [](const Jobs::Context&) { return "{}"; }).id);
-  EXPECT_LE(jobs.list().size(), 100U);
-  EXPECT_EQ(jobs.list().back().id, "150");
-  EXPECT_FALSE(jobs.find("1"));
-  EXPECT_FALSE(jobs.find("nonsense"));
+    ended(jobs_, jobs_.start(JobKind::learn, "", [](const Jobs::Context&) { return JobResult(); }).id);
+  EXPECT_LE(jobs_.list().size(), 100U);
+  EXPECT_EQ(jobs_.list().back().id, "150");
+  EXPECT_FALSE(jobs_.find("1"));
+  EXPECT_FALSE(jobs_.find("nonsense"));
 }
 
 }  // namespace
