@@ -51,6 +51,13 @@ std::optional<VectorXd> solve_positive_definite(const Eigen::Ref<const MatrixXd>
   return factor.solve(right);
 }
 
+std::optional<MatrixXd> solve_positive_definite_in_place(MatrixXd& matrix,
+                                                         const Eigen::Ref<const MatrixXd>& right) {
+  const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(matrix);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  return factor.solve(right);
+}
+
 SymmetricSolution solve_symmetric(const Eigen::Ref<const MatrixXd>& matrix,
                                   const Eigen::Ref<const MatrixXd>& right) {
   const Eigen::LDLT<MatrixXd> factor(matrix);

@@ -44,6 +44,10 @@ void orthonormalize_columns(Eigen::MatrixXd& columns);
 std::optional<Eigen::VectorXd> solve_positive_definite(const Eigen::Ref<const Eigen::MatrixXd>& matrix,
                                                        const Eigen::Ref<const Eigen::VectorXd>& right);
 
+/// The same for many right sides. Only the lower triangle of `matrix` is read; it is overwritten.
+std::optional<Eigen::MatrixXd> solve_positive_definite_in_place(
+    Eigen::MatrixXd& matrix, const Eigen::Ref<const Eigen::MatrixXd>& right);
+
 /// Solution and inverse of a symmetric positive semidefinite system, LDLᵀ with pivoting.
 struct SymmetricSolution {
   Eigen::MatrixXd solution;

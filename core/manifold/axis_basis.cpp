@@ -149,6 +149,21 @@ void AxisBasis::weights(Location place, int order, std::span<double> weights) co
   }
 }
 
+std::vector<double> AxisBasis::greville_abscissae() const {
+  // Coefficient i is the first of segment i − offset_; ξ is the mean of the `degree` knots inside its
+  // support.
+  std::vector<double> result(coefficients_, 0.0);
+  if (degree_ == 0) return result;
+  const bool ghosts = coefficients_ > samples_.size();
+  for (std::size_t i = 0; i < coefficients_; ++i) {
+    const auto centre = static_cast<std::ptrdiff_t>(i) - (ghosts ? 1 : 0);
+    if (degree_ == 1) result[i] = sample(centre);
+    if (degree_ == 2) result[i] = 0.5 * (knot(centre) + knot(centre + 1));
+    if (degree_ == 3) result[i] = (knot(centre - 1) + knot(centre) + knot(centre + 1)) / 3.0;
+  }
+  return result;
+}
+
 Eigen::MatrixXd AxisBasis::interpolation_matrix() const {
   const auto count = static_cast<Eigen::Index>(coefficients_);
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(count, count);

@@ -74,6 +74,11 @@ class AxisBasis {
   /// @pre weights.size() ≥ degree()+1, order ≥ 0.
   void weights(Location place, int order, std::span<double> weights) const;
 
+  /// The Greville abscissae ξ: the function Σ ξ_i B_i is the position itself, along an open axis everywhere,
+  /// along a periodic one away from the seam. Ascending; one a coefficient, the first beyond the first sample
+  /// where the axis has ghosts. All 0 for degree 0.
+  [[nodiscard]] std::vector<double> greville_abscissae() const;
+
   /// The square matrix A of the interpolation problem A c = (samples, 0, 0): one row a sample, then the end
   /// conditions if any.
   [[nodiscard]] Eigen::MatrixXd interpolation_matrix() const;

@@ -38,6 +38,21 @@ Eigen::MatrixXd solve_axis(const AxisBasis& basis, Eigen::Index samples, Eigen::
 
 }  // namespace
 
+Eigen::MatrixXd grid_poses(std::span<const SampleAxis> axes) {
+  Eigen::Index count = 1;
+  for (const SampleAxis& axis : axes) count *= static_cast<Eigen::Index>(axis.samples.size());
+  Eigen::MatrixXd poses(static_cast<Eigen::Index>(axes.size()), count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    auto rest = static_cast<std::size_t>(i);
+    for (std::size_t a = axes.size(); a-- > 0;) {
+      const std::vector<double>& samples = axes[a].samples;
+      poses(static_cast<Eigen::Index>(a), i) = samples[rest % samples.size()];
+      rest /= samples.size();
+    }
+  }
+  return poses;
+}
+
 Manifold::Manifold(std::vector<SampleAxis> axes, int degree) : axes_(std::move(axes)), degree_(degree) {
   if (axes_.empty() || axes_.size() > max_manifold_dofs)
     throw std::invalid_argument("a manifold has 1 to " + std::to_string(max_manifold_dofs) + " axes, got " +
