@@ -16,6 +16,7 @@
 #include "core/base/error.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/hardware_commands.h"
+#include "daemon/cli/man_page.h"
 #include "daemon/cli/service_commands.h"
 
 namespace eigenpose::cli {
@@ -116,6 +117,7 @@ int run(int argc, char** argv) {
   CLI::App app(about, "eigenpose");
   app.set_version_flag("--version", std::string("eigenpose ") + EIGENPOSE_VERSION);
   app.footer(first_steps);
+  add_man_flag(app, 1, "eigenposed(8)");
   app.require_subcommand(1);
   for (const AddCommand add : commands) add(app, line);
 
