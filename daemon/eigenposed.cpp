@@ -19,9 +19,9 @@
 #include "daemon/api/routes.h"
 #include "daemon/api/server.h"
 #include "daemon/api/unix_socket.h"
-#include "daemon/cli/man_page.h"
 #include "daemon/composition.h"
 #include "daemon/devices.h"
+#include "daemon/manual/man_page.h"
 #include "daemon/service/service.h"
 
 namespace eigenpose {
@@ -138,7 +138,7 @@ int main_with_words(int argc, char** argv) {
       "Exit code: 0 stopped on SIGTERM or SIGINT, 1 could not start (one line on stderr says why), 2 line "
       "not "
       "understood.");
-  cli::add_man_flag(app, 8, "eigenpose(1)");
+  add_man_flag(app, 8, "eigenpose(1)");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -16,8 +16,8 @@
 #include "core/base/error.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/hardware_commands.h"
-#include "daemon/cli/man_page.h"
 #include "daemon/cli/service_commands.h"
+#include "daemon/manual/man_page.h"
 
 namespace eigenpose::cli {
 namespace {

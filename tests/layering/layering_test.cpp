@@ -43,14 +43,15 @@ const std::map<std::string, std::set<std::string>> outer_licences = {
     {"daemon/hardware",
      {"daemon", "daemon/rig", "daemon/api/client", "config", "drivers", "drivers/v4l2", "drivers/modbus",
       "drivers/usb", "core/base"}},
+    {"daemon/manual", {}},
     {"daemon/cli",
-     {"daemon/api/client", "daemon/hardware", "config", "drivers", "sim", "core/base", "core/image",
-      "core/dataset", "core/subspace", "core/manifold", "core/model", "core/recognition", "core/learning",
-      "core/evaluation"}},
+     {"daemon/api/client", "daemon/hardware", "daemon/manual", "config", "drivers", "sim", "core/base",
+      "core/image", "core/dataset", "core/subspace", "core/manifold", "core/model", "core/recognition",
+      "core/learning", "core/evaluation"}},
     {"daemon/demo", {"daemon/api/client", "daemon/cli", "sim", "core/base"}},
     {"daemon",
-     {"daemon/rig", "daemon/service", "daemon/api", "config", "sim", "drivers", "drivers/v4l2",
-      "drivers/modbus", "drivers/usb", "core/base", "core/image"}},
+     {"daemon/manual", "daemon/rig", "daemon/service", "daemon/api", "config", "sim", "drivers",
+      "drivers/v4l2", "drivers/modbus", "drivers/usb", "core/base", "core/image"}},
 };
 
 std::map<std::string, std::set<std::string>> all_licences() {

@@ -8,7 +8,7 @@ namespace CLI {
 class App;
 }
 
-namespace eigenpose::cli {
+namespace eigenpose {
 
 /// The manual page of a program in roff, for section `section` of the manual: description, options, every
 /// subcommand with its own options and examples, and the footer.
@@ -18,4 +18,4 @@ std::string man_page(const CLI::App& app, int section, const std::string& see_al
 /// Adds the flag `--man`, which is not listed by --help: prints the manual page and ends with CLI::Success.
 void add_man_flag(CLI::App& app, int section, const std::string& see_also);
 
-}  // namespace eigenpose::cli
+}  // namespace eigenpose

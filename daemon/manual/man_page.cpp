@@ -1,4 +1,4 @@
-#include "daemon/cli/man_page.h"
+#include "daemon/manual/man_page.h"
 
 #include <algorithm>
 #include <cctype>
@@ -9,7 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
-namespace eigenpose::cli {
+namespace eigenpose {
 namespace {
 
 std::string upper(std::string text) {
@@ -112,4 +112,4 @@ void add_man_flag(CLI::App& app, int section, const std::string& see_also) {
       ->group("");
 }
 
-}  // namespace eigenpose::cli
+}  // namespace eigenpose
