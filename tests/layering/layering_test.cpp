@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <map>
 #include <regex>
 #include <set>
@@ -11,6 +12,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "tests/layering/drawing.h"
 
 namespace {
 
@@ -127,6 +130,29 @@ TEST(Layering, EveryIncludeOfOursIsLicensed) {
     if (to.empty() || from == to) continue;
     EXPECT_TRUE(licences.at(from).count(to)) << where(include) << ": " << from << " may not know " << to;
   }
+}
+
+TEST(Layering, TheRoomsAreDrawnWithoutACircle) {
+  eigenpose::layering::Edges edges;
+  for (const Include& include : all_includes()) {
+    if (!include.quoted) continue;
+    const std::string from = layer_of(include.file);
+    const std::string to = layer_of(include.target);
+    if (!from.empty() && !to.empty() && from != to) ++edges[{from, to}];
+  }
+  const auto floors = eigenpose::layering::floors(edges);
+  EXPECT_EQ(floors.at("core/base"), 0);
+  for (const auto& [edge, count] : edges)
+    EXPECT_GT(floors.at(edge.first), floors.at(edge.second)) << edge.first << " includes " << edge.second;
+  const fs::path picture = fs::path(EIGENPOSE_BINARY_DIR) / "rooms.svg";
+  std::ofstream(picture) << eigenpose::layering::draw(edges);
+  std::cout << eigenpose::layering::describe(edges) << "drawn in " << picture.string() << "\n";
+}
+
+TEST(Layering, ARoomThatReachesItselfIsRefused) {
+  EXPECT_THROW(eigenpose::layering::floors({{{"a", "b"}, 1}, {{"b", "c"}, 1}, {{"c", "a"}, 1}}),
+               std::logic_error);
+  EXPECT_EQ(eigenpose::layering::floors({{{"a", "b"}, 1}, {{"a", "c"}, 1}, {{"b", "c"}, 1}}).at("a"), 2);
 }
 
 TEST(Layering, TheLibraryKnowsNoDeviceAndNoSocket) {
