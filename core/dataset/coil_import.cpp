@@ -4,15 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
 
 #include "core/base/error.h"
-#include "core/dataset/image_set.h"
 #include "core/dataset/natural_order.h"
-#include "core/image/picture_file.h"
-#include "core/image/segmentation.h"
 
 namespace eigenpose {
 namespace {
@@ -20,26 +18,23 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Pictures of one object by the number in their names.
-using Numbered = std::map<int, fs::path>;
+using Numbered = std::map<double, fs::path>;
 using Objects = std::map<std::string, Numbered, NaturalLess>;
 
-/// An object counts as filling a picture when it spans this share of one side. Size-normalised views do,
-/// whatever threshold finds them; a turntable seen from above leaves a margin.
-constexpr double filling_span = 0.95;
-/// The share of views that must be filled for a folder to count as cropped. One collection is photographed
-/// one way, so all its objects are judged together; an object with dark edges alone would be misjudged.
-constexpr double filled_views = 0.75;
+/// A gap counts as one when it is larger than this many even steps.
+constexpr double gap_steps = 2.5;
+constexpr double same_angle_deg = 1e-6;
 
 /// "obj3__17.png" → obj3, 17.
-std::optional<std::pair<std::string, int>> parse_name(const std::string& name) {
+std::optional<std::pair<std::string, double>> parse_name(const std::string& name) {
   constexpr std::string_view extension = ".png";
   const auto mark = name.rfind("__");
   if (!name.ends_with(extension) || mark == std::string::npos || mark == 0) return std::nullopt;
   const char* first = name.data() + mark + 2;
   const char* last = name.data() + name.size() - extension.size();
-  int number = 0;
-  const auto [end, error] = std::from_chars(first, last, number);
-  if (error != std::errc() || end != last || first == last || number < 0) return std::nullopt;
+  double number = 0;
+  const auto [end, error] = std::from_chars(first, last, number, std::chars_format::fixed);
+  if (error != std::errc() || end != last || first == last || !(number >= 0.0)) return std::nullopt;
   return std::pair(name.substr(0, mark), number);
 }
 
@@ -63,109 +58,78 @@ Objects list_objects(const fs::path& folder) {
   return objects;
 }
 
-/// Evenly spaced numbers that together make a full turn, starting anywhere.
-void check_turn(const std::string& object, const Numbered& pictures, const fs::path& folder,
-                double degrees_per_step) {
+/// "22.5": at most two decimals.
+std::string degrees_text(double value) {
+  std::string text = std::to_string(std::round(value * 100.0) / 100.0);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+/// The largest gap between neighbouring angles of a turn.
+struct Gap {
+  double after = 0.0;  ///< begins there, degrees
+  double size = 0.0;   ///< degrees
+};
+
+/// @throws FileError unless the numbers are at least 3 different angles within one turn.
+Gap check_turn(const std::string& object, const Numbered& pictures, const fs::path& folder,
+               double degrees_per_step) {
   if (pictures.size() < 3)
     throw FileError(folder, "has " + std::to_string(pictures.size()) + " picture(s) of \"" + object +
                                 "\"; a turn needs at least 3");
-  const double step = 360.0 / (degrees_per_step * static_cast<double>(pictures.size()));
-  const int first = pictures.begin()->first;
-  std::size_t i = 0;
-  for (const auto& [number, file] : pictures) {
-    const double expected = first + static_cast<double>(i++) * step;
-    if (std::abs(number - expected) < 1e-6) continue;
-    throw FileError(file, "breaks the even turn of \"" + object + "\": " + std::to_string(pictures.size()) +
-                              " pictures put number " + std::to_string(std::lround(expected)) +
-                              " here; a picture is missing, or --angle is wrong");
+  Gap largest;
+  const double first = pictures.begin()->first * degrees_per_step;
+  for (auto at = pictures.begin(); at != pictures.end(); ++at) {
+    const double angle = at->first * degrees_per_step;
+    if (angle - first >= 360.0 - same_angle_deg)
+      throw FileError(at->second,
+                      "would show \"" + object + "\" at " + degrees_text(angle) +
+                          " degrees, a full turn or more after its first picture; --angle is wrong, "
+                          "or the picture belongs to another turn");
+    const auto next = std::next(at);
+    const double gap = (next != pictures.end() ? next->first * degrees_per_step : first + 360.0) - angle;
+    if (gap > largest.size) largest = {angle, gap};
   }
+  return largest;
 }
 
-/// True if what stands out reaches from edge to edge.
-bool fills(Segmenter& segmenter, const cv::Mat& image) {
-  cv::Rect all;
-  for (const Region& region : segmenter.segment(image)) all |= region.box;
-  return all.width >= filling_span * image.cols || all.height >= filling_span * image.rows;
-}
-
-void check_same_kind(const cv::Mat& image, const cv::Mat& first, const fs::path& file) {
-  if (image.size() == first.size() && image.type() == first.type()) return;
-  throw FileError(file, "is " + std::to_string(image.cols) + "x" + std::to_string(image.rows) + " " +
-                            cv::typeToString(image.type()) + ", the first picture of the object is " +
-                            std::to_string(first.cols) + "x" + std::to_string(first.rows) + " " +
-                            cv::typeToString(first.type()) + "; all views of an object must be alike");
-}
-
-/// Reads all pictures of one object and writes its set.
-void import_object(const std::string& object, const Numbered& pictures, const fs::path& root, bool cropped,
-                   const nlohmann::json& source, const CoilImportOptions& options,
-                   const std::function<void()>& step) {
-  if (fs::exists(root / object / "set.json") && !ImageSet::open(root / object).complete())
-    fs::remove_all(root / object);  // what a broken-off import left
-  ImageSetWriter writer(root, object, turntable_workspace(), source, {cropped, false});
-  cv::Mat first;
-  for (const auto& [number, file] : pictures) {
-    step();
-    const cv::Mat image = load_picture(file);
-    if (first.empty()) first = image;
-    check_same_kind(image, first, file);
-    writer.add(image, {number * options.angle.degrees_per_step},
-               {{"imported_name", file.filename().string()}});
-  }
-  writer.finish();
-}
-
-/// Share of the views an object fills. At most `looks` of each object are looked at, evenly spread.
-double measure_filled(const Objects& objects, const std::function<void()>& step) {
-  constexpr std::size_t looks = 12;
-  Segmenter segmenter;
-  std::size_t seen = 0;
-  std::size_t filled = 0;
-  for (const auto& [object, pictures] : objects) {
-    const std::size_t stride = std::max<std::size_t>(1, pictures.size() / looks);
-    std::size_t i = 0;
-    for (const auto& [number, file] : pictures) {
-      if (i++ % stride != 0) continue;
-      step();
-      ++seen;
-      if (fills(segmenter, load_picture(file))) ++filled;
-    }
-  }
-  return static_cast<double>(filled) / static_cast<double>(seen);
+/// What is uneven about a turn of `count` views; empty where nothing is.
+std::string gap_text(const std::string& object, const Gap& gap, std::size_t count, double limit) {
+  const double even = 360.0 / static_cast<double>(count);
+  if (gap.size <= limit * even + same_angle_deg) return {};
+  return "the " + std::to_string(count) + " views of \"" + object + "\" leave a gap of " +
+         degrees_text(gap.size) + " degrees after " + degrees_text(gap.after) +
+         "; evenly spaced ones would stand " + degrees_text(even) +
+         " degrees apart: a picture is missing, or --angle is wrong";
 }
 
 }  // namespace
 
 ImportReport import_coil(const fs::path& folder, const fs::path& root, const CoilImportOptions& options,
                          const Progress& progress, std::stop_token stop) {
-  if (!(options.angle.degrees_per_step > 0.0))
-    throw std::invalid_argument("degrees per step is " + std::to_string(options.angle.degrees_per_step) +
-                                ", must be above 0");
-  const Objects objects = list_objects(folder);
-  std::size_t total = 0;
-  for (const auto& [object, pictures] : objects) {
-    check_turn(object, pictures, folder, options.angle.degrees_per_step);
-    total += pictures.size();
+  const double step = options.angle.degrees_per_step;
+  if (!(step > 0.0) || !std::isfinite(step))
+    throw std::invalid_argument("degrees per step is " + std::to_string(step) + ", must be above 0");
+  ViewImport import;
+  import.workspace = turntable_workspace();
+  import.kind = options.views;
+  import.bad_views = options.bad_views;
+  std::vector<std::string> warnings;
+  for (const auto& [name, pictures] : list_objects(folder)) {
+    const Gap gap = check_turn(name, pictures, folder, step);
+    const bool strict = options.bad_views == BadViews::refuse;
+    const std::string uneven = gap_text(name, gap, pictures.size(), strict ? 1.0 : gap_steps);
+    if (strict && !uneven.empty()) throw FileError(folder, uneven);
+    if (!uneven.empty()) warnings.push_back(uneven);
+    ImportObject object{name, {}};
+    for (const auto& [number, file] : pictures) object.views.push_back({file, {number * step}});
+    import.objects.push_back(std::move(object));
   }
-  const auto check_stop = [&] {
-    if (stop.stop_requested()) throw Interrupted("interrupted; the sets finished before are kept");
-  };
-  ImportReport report;
-  report.filled = measure_filled(objects, check_stop);
-  report.cropped = options.views == ViewKind::measured ? report.filled >= filled_views
-                                                       : options.views == ViewKind::cropped;
-  const nlohmann::json source = {{"imported_from", fs::absolute(folder).string()},
-                                 {"naming", "coil"},
-                                 {"degrees_per_step", options.angle.degrees_per_step},
-                                 {"filled_views_share", report.filled}};
-  std::size_t done = 0;
-  for (const auto& [object, pictures] : objects) {
-    import_object(object, pictures, root, report.cropped, source, options, [&] {
-      check_stop();
-      if (progress) progress({"importing", ++done, total});
-    });
-    report.sets.push_back({object, pictures.size()});
-  }
+  const nlohmann::json source = {
+      {"imported_from", fs::absolute(folder).string()}, {"naming", "coil"}, {"degrees_per_step", step}};
+  ImportReport report = import_views(import, root, source, progress, stop);
+  report.warnings.insert(report.warnings.begin(), warnings.begin(), warnings.end());
   return report;
 }
 

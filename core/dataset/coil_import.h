@@ -2,14 +2,11 @@
 
 /// Turning photographs named as the COIL collections name theirs into image sets.
 
-#include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <stop_token>
-#include <string>
-#include <vector>
 
 #include "core/base/progress.h"
+#include "core/dataset/view_import.h"
 
 namespace eigenpose {
 
@@ -19,36 +16,20 @@ struct CoilAngle {
   double degrees_per_step = 1.0;
 };
 
-/// How views of an image set are to be taken later.
-enum class ViewKind {
-  measured,  ///< looked at: cropped when objects fill most pictures of the folder from edge to edge
-  cropped,   ///< each picture is the object alone
-  scene,     ///< the object stands somewhere in the picture
-};
-
 struct CoilImportOptions {
   CoilAngle angle;
   ViewKind views = ViewKind::measured;
+  /// `refuse` also wants the views of an object to stand evenly around the turn.
+  BadViews bad_views = BadViews::leave_out;
 };
 
-/// What was made.
-struct ImportReport {
-  struct Set {
-    std::string object;
-    std::size_t views = 0;
-  };
-  std::vector<Set> sets;
-  bool cropped = false;
-  /// Share of all views in which the object reaches across the whole picture.
-  double filled = 0.0;
-};
-
-/// Imports every `<object>__<number>.png` of `folder` into one image set an object below `root`.
+/// Imports every `<object>__<number>.png` of `folder` into one image set an object below `root`. The number
+/// may have decimals (`mug__12.5.png`), and angles may be uneven or leave a gap, of which the report warns.
 ///
-/// Strict: the pictures of an object must stand evenly around a full turn, be of one size and kind, and no
-/// other file may lie between them (hidden files apart). Everything is checked by name before the first
+/// No other file may lie between them (hidden files apart). Everything is checked by name before the first
 /// picture is read.
-/// @throws FileError naming the file; Interrupted. Sets finished before stay; an unfinished one is removed.
+/// @throws FileError naming a file with another name, two pictures of one angle, an angle beyond one turn, or
+/// an object with fewer than 3 pictures; what import_views throws. Sets finished before stay.
 ImportReport import_coil(const std::filesystem::path& folder, const std::filesystem::path& root,
                          const CoilImportOptions& options, const Progress& progress = {},
                          std::stop_token stop = {});

@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/dataset/image_set.h"
+#include "core/dataset/view_import.h"
 #include "core/image/picture_file.h"
 
 namespace eigenpose {
@@ -28,7 +29,7 @@ cv::Mat in_a_square(const cv::Mat& cut, const Background& background) {
 
 /// Nothing is begun that cannot be finished. @param names as given, or made.
 void check_names(const std::vector<std::string>& names, std::size_t parts,
-                 const std::filesystem::path& picture, const std::filesystem::path& root) {
+                 const std::filesystem::path& picture) {
   if (names.size() != parts)
     throw FileError(picture, "shows " + std::to_string(parts) + " parts, but " +
                                  std::to_string(names.size()) +
@@ -39,9 +40,23 @@ void check_names(const std::vector<std::string>& names, std::size_t parts,
         names.begin() + static_cast<std::ptrdiff_t>(i))
       throw std::invalid_argument("two parts are named \"" + names[i] +
                                   "\"; every part is an object of its own");
-    if (std::filesystem::exists(root / names[i]))
-      throw FileError(root / names[i], "stands there already; remove it or give the part another name");
   }
+}
+
+/// Which parts an earlier run has finished. @throws FileError where something else stands under a name.
+std::vector<bool> finished_parts(const std::vector<std::string>& names, const std::filesystem::path& root,
+                                 std::size_t views, const nlohmann::json& source) {
+  ImportObject part;
+  for (std::size_t v = 0; v < views; ++v)
+    part.views.push_back({{}, {360.0 * static_cast<double>(v) / static_cast<double>(views)}});
+  std::vector<bool> finished;
+  for (const std::string& name : names) {
+    part.name = name;
+    finished.push_back(import_finished(part, root, turntable_workspace(), source));
+    if (!finished.back() && std::filesystem::exists(root / name))
+      throw FileError(root / name, "stands there already; remove it or give the part another name");
+  }
+  return finished;
 }
 
 /// Writes the image set of one part; leaves nothing where it fails.
@@ -88,12 +103,14 @@ std::vector<std::string> import_turned(const std::filesystem::path& picture,
   std::vector<std::string> names = options.names;
   if (names.empty())
     for (std::size_t i = 0; i < parts.size(); ++i) names.push_back("part" + std::to_string(i + 1));
-  check_names(names, parts.size(), picture, root);
+  check_names(names, parts.size(), picture);
 
   const nlohmann::json source = {{"imported_from", std::filesystem::absolute(picture).string()},
                                  {"turned", true}};
+  const std::vector<bool> finished = finished_parts(names, root, options.views, source);
   const Background& background = segmenter.background();
-  for (std::size_t p = 0; p < parts.size(); ++p)
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (finished[p]) continue;
     write_turns(in_a_square(segmenter.cut_out(image, parts[p]), background), background.color(), root,
                 names[p], source, options.views, [&](std::size_t view) {
                   if (stop.stop_requested())
@@ -101,6 +118,7 @@ std::vector<std::string> import_turned(const std::filesystem::path& picture,
                   if (progress)
                     progress({"turning", p * options.views + view + 1, parts.size() * options.views});
                 });
+  }
   return names;
 }
 

@@ -24,7 +24,7 @@ struct TurnedImportOptions {
 /// Cuts every part out of one picture and writes an image set of it, turned in the picture's plane; a view's
 /// `table` is by how many degrees, counter-clockwise, from how the part lies in the picture. What touches the
 /// picture's border is left out. Names are checked before anything is written; sets finished before an error
-/// stay.
+/// stay, and the same import called again continues behind them.
 /// @returns the names. @throws FileError naming the file: not a picture, no part in it, as many names as
 /// there are not parts, a set that stands there already; std::invalid_argument for options out of range;
 /// Interrupted.

@@ -2,6 +2,7 @@
 #include "core/dataset/turned_import.h"
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -87,6 +88,30 @@ TEST_F(TurnedImport, SaysWhatIsWrong) {
   cv::imwrite(empty, cv::Mat(100, 100, CV_8UC1, cv::Scalar(20)));
   EXPECT_THROW(import_turned(empty, sets(), {}), FileError);
   EXPECT_THROW(import_turned(sets() / "absent.png", sets(), {}), FileError);
+}
+
+TEST_F(TurnedImport, ContinuesWhereItWasKilled) {
+  const auto file = picture();
+  const nlohmann::json source = {{"imported_from", std::filesystem::absolute(file).string()},
+                                 {"turned", true}};
+  (void)import_turned(file, sets(), {.names = {"plate", "disc"}, .views = 4});
+  std::filesystem::remove_all(sets() / "disc");
+  ImageSetWriter(sets(), "disc", turntable_workspace(), source)
+      .add(cv::Mat(9, 9, CV_8UC1, cv::Scalar(1)), {0.0});
+  const auto written = std::filesystem::last_write_time(sets() / "plate/000000.png");
+  (void)import_turned(file, sets(), {.names = {"plate", "disc"}, .views = 4});
+  EXPECT_EQ(ImageSet::open(sets() / "disc").views().size(), 4U);
+  EXPECT_GT(ImageSet::open(sets() / "disc").load(0).rows, 9);
+  EXPECT_EQ(std::filesystem::last_write_time(sets() / "plate/000000.png"), written)
+      << "what was finished stays";
+}
+
+TEST_F(TurnedImport, RemovesNothingThatAnAcquisitionHasBegun) {
+  ImageSetWriter(sets(), "disc", turntable_workspace(), nlohmann::json::object())
+      .add(cv::Mat(9, 9, CV_8UC1, cv::Scalar(1)), {0.0});
+  EXPECT_THROW(import_turned(picture(), sets(), {.names = {"plate", "disc"}, .views = 4}), FileError);
+  EXPECT_EQ(ImageSet::open(sets() / "disc").views().size(), 1U);
+  EXPECT_FALSE(std::filesystem::exists(sets() / "plate"));
 }
 
 TEST_F(TurnedImport, LeavesNoUnfinishedSetWhenInterrupted) {
