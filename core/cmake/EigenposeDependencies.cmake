@@ -4,6 +4,8 @@ find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(ZLIB REQUIRED)
+find_package(JPEG REQUIRED)
+find_package(PNG REQUIRED)
 find_package(nlohmann_json REQUIRED)
 # "hdf5" may mean the MPI build; this name is always the plain one.
 pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5-serial)

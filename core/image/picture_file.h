@@ -12,12 +12,18 @@
 
 namespace eigenpose {
 
-/// Decodes a whole file: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1; an alpha band is dropped.
+/// Decodes a whole file: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1.
 ///
-/// PNG files are checked chunk by chunk first (lengths, CRCs, the end mark), JPEG files for their end mark
-/// and PNM files for their length, because the decoders behind OpenCV fill what is missing with grey and say
-/// nothing.
-/// @throws FileError when the file is missing, empty, truncated, damaged or of another kind.
+/// PNG, JPEG, TIFF, BMP, PBM, PGM and PPM are read, known by their content and not by their name, every other
+/// format is refused. For all of them:
+///  - a picture of which a pixel is missing or damaged is refused; bytes after its end are ignored;
+///  - samples are scaled from the range of the format, grey of more than 8 bits to CV_16UC1, all else to
+///    8 bits; gamma and colour profiles are ignored;
+///  - what is transparent is black, which is background: samples are multiplied by their opacity;
+///  - the picture is turned and mirrored as EXIF or TIFF orientation says;
+///  - more than 134 million pixels are refused before anything is decoded.
+/// @throws FileError when the file is missing, empty, no plain file (a pipe, a device), truncated, damaged,
+/// too large or of another kind.
 cv::Mat load_picture(const std::filesystem::path& file);
 
 /// The same from memory; `name` is what errors call it.

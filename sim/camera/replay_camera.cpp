@@ -5,10 +5,11 @@
 #include <optional>
 #include <utility>
 
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "core/base/angle.h"
 #include "core/base/error.h"
+#include "core/image/picture_file.h"
 #include "sim/lab/chance.h"
 #include "sim/scene/stage.h"
 
@@ -60,8 +61,8 @@ void ReplayCamera::read_folder(SimLab& lab) {
   for (const auto& entry : std::filesystem::directory_iterator(options_.folder)) {
     const auto stem = parsed_stem(entry.path().stem().string());
     if (!stem || entry.path().extension() != ".png") continue;
-    cv::Mat picture = cv::imread(entry.path().string(), cv::IMREAD_UNCHANGED);
-    if (picture.empty() || (picture.type() != CV_8UC1 && picture.type() != CV_8UC3)) {
+    cv::Mat picture = load_picture(entry.path());
+    if (picture.type() != CV_8UC1 && picture.type() != CV_8UC3) {
       throw FileError(entry.path(), "is not a grey or colour PNG of 8 bits: remove or repair it");
     }
     if (!size.empty() && (picture.size() != size || picture.type() != type)) {

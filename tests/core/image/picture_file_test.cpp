@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "core/base/error.h"
 #include "tests/support/temporary_folder.h"
@@ -52,12 +53,42 @@ TEST(PictureFile, RefusesAPngWithOneFlippedByteAnywhere) {
   }
 }
 
-TEST(PictureFile, RefusesTruncatedJpegAndPgm) {
-  const std::string pgm = "P5\n# made by hand\n4 3\n255\n0123456789a";  // one byte short
-  EXPECT_THAT(refusal({pgm.begin(), pgm.end()}), HasSubstr("11 of 12 bytes"));
-  const std::string whole = pgm + "b";
-  EXPECT_EQ(refusal({whole.begin(), whole.end()}), "accepted");
-  EXPECT_THAT(refusal({0xff, 0xd8, 0xff, 0xe0, 0, 16}), HasSubstr("JPEG"));
+TEST(PictureFile, RefusesEveryFormatThatIsNotPromised) {
+  const std::vector<std::string> others = {"GIF89a\1\0\1\0",
+                                           std::string("RIFF\x1a\0\0\0WEBPVP8L", 16),
+                                           "\x76\x2f\x31\x01 EXR",
+                                           "#?RADIANCE\n",
+                                           std::string("\0\0\0\x0cjP  \r\n\x87\n", 12),
+                                           "<svg xmlns='http://www.w3.org/2000/svg'/>",
+                                           "\xff\x4f\xff\x51 J2K",
+                                           std::string("\0\0\1\0", 4),
+                                           "%PDF-1.4\n",
+                                           "\x59\xa6\x6a\x95 sun"};
+  for (const std::string& bytes : others)
+    EXPECT_THAT(refusal({bytes.begin(), bytes.end()}),
+                HasSubstr("not a picture that can be read; PNG, JPEG"));
+}
+
+TEST(PictureFile, KnowsAFileByItsContentAndNotByItsName) {
+  const test::TemporaryFolder folder;
+  const auto bytes = encode_png(picture_noise(3, 4, CV_8UC1));
+  std::ofstream(folder.path() / "photo.jpg", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  EXPECT_EQ(load_picture(folder.path() / "photo.jpg").size(), cv::Size(4, 3));
+}
+
+TEST(PictureFile, RefusesPipesAndDevicesAtOnce) {
+  const test::TemporaryFolder folder;
+  const auto pipe = folder.path() / "pipe.png";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::filesystem::path& file : {pipe, std::filesystem::path("/dev/null")}) {
+    try {
+      load_picture(file);
+      ADD_FAILURE() << "accepted";
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("; give a plain file"));
+    }
+  }
 }
 
 TEST(PictureFile, SaysWhatIsWrongWithAFile) {
