@@ -64,7 +64,7 @@ void BufferStream::fail(const char* operation, int error) const {
 }
 
 void BufferStream::map_all(unsigned count) {
-  // One being filled, one waiting, one being read: with fewer a frame is lost each time one is looked at.
+  // One being filled, one waiting, one being read: with fewer a frame is lost whenever one is read.
   if (count < 3)
     throw DeviceError(name_, "asking for buffers", "the driver grants only " + std::to_string(count));
   for (std::uint32_t index = 0; index < count; ++index) {

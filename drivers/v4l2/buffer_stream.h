@@ -63,7 +63,7 @@ class BufferStream {
   std::vector<Mapped> mapped_;
   std::vector<std::uint32_t> refused_;
   unsigned with_driver_ = 0;
-  TimePoint empty_at_{};  ///< when no buffer was filled, last time we looked
+  TimePoint empty_at_{};  ///< when no buffer was filled, at the last poll
 };
 
 /// The typed failure for errno of a call on a video device: DeviceLost when it means that the device is gone.

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Memory for pictures that comes back when the last one who looks at it lets go, and is used again.
+/// Memory for pictures that is used again once the last holder has released it.
 
 #include <memory>
 

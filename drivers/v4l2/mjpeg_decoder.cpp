@@ -1,75 +1,76 @@
 #include "drivers/v4l2/mjpeg_decoder.h"
 
-#include <csetjmp>
-#include <cstdio>
-
-#include <jpeglib.h>
+#include <algorithm>
+#include <array>
+#include <string_view>
 
 namespace eigenpose {
-
-struct MjpegDecoder::State {
-  jpeg_decompress_struct jpeg{};
-  jpeg_error_mgr errors{};
-  std::jmp_buf escape{};
-};
-
 namespace {
 
-/// libjpeg reports a fatal error by calling this, which must not return.
-void leave(j_common_ptr jpeg) {
-  auto* escape = static_cast<std::jmp_buf*>(jpeg->client_data);
-  std::longjmp(*escape, 1);
+using Bytes = std::span<const std::uint8_t>;
+
+/// Pixels alone count: a missing end marker changes none.
+FrameFault frame_fault(JpegFault fault) {
+  switch (fault) {
+    case JpegFault::none:
+    case JpegFault::missing_end:
+      return FrameFault::none;
+    case JpegFault::no_image:
+      return FrameFault::no_image;
+    case JpegFault::unsupported:
+      return FrameFault::unsupported;
+    case JpegFault::cut_short:
+    case JpegFault::missing_scans:
+      return FrameFault::cut_short;
+    case JpegFault::damaged_data:
+    case JpegFault::stray_bytes:
+      return FrameFault::damaged_data;
+  }
+  return FrameFault::damaged_data;
 }
 
-/// A warning means damaged data. Counted, not printed; the caller asks for the count.
-void count_warning(j_common_ptr jpeg, int level) {
-  if (level < 0) ++jpeg->err->num_warnings;
-}
-
-/// No object with a destructor may live here: an error jumps out.
-bool decode_rows(jpeg_decompress_struct& jpeg, std::jmp_buf& escape, const std::uint8_t* data,
-                 std::size_t size, std::uint8_t* rows, std::size_t stride, unsigned width, unsigned height,
-                 bool color) {
-  if (setjmp(escape) != 0) {
-    jpeg_abort_decompress(&jpeg);
-    return false;
-  }
-  jpeg_mem_src(&jpeg, data, size);
-  jpeg_read_header(&jpeg, TRUE);
-  if (jpeg.image_width != width || jpeg.image_height != height) {
-    jpeg_abort_decompress(&jpeg);
-    return false;
-  }
-  jpeg.out_color_space = color ? JCS_EXT_BGR : JCS_GRAYSCALE;
-  jpeg_start_decompress(&jpeg);
-  while (jpeg.output_scanline < jpeg.output_height) {
-    JSAMPROW row = rows + jpeg.output_scanline * stride;
-    jpeg_read_scanlines(&jpeg, &row, 1);
-  }
-  jpeg_finish_decompress(&jpeg);
-  return jpeg.err->num_warnings == 0;
+/// Whether the first field has the lower line of each pair: polarity 2 in the APP0 segment of Open-DML MJPEG,
+/// FF E0, length, "AVI1", polarity. Cameras put it first.
+bool lower_lines_first(Bytes frame) {
+  constexpr std::string_view name = "AVI1";
+  constexpr std::size_t name_at = 6;  // behind FF D8 FF E0 and the length
+  return frame.size() > name_at + name.size() && frame[2] == 0xff && frame[3] == 0xe0 &&
+         std::equal(name.begin(), name.end(), frame.begin() + name_at) && frame[name_at + name.size()] == 2;
 }
 
 }  // namespace
 
-MjpegDecoder::MjpegDecoder() : state_(std::make_unique<State>()) {
-  state_->jpeg.err = jpeg_std_error(&state_->errors);
-  state_->errors.error_exit = leave;
-  state_->errors.emit_message = count_warning;
-  state_->errors.output_message = [](j_common_ptr) {};
-  jpeg_create_decompress(&state_->jpeg);
-  state_->jpeg.client_data = &state_->escape;
+FrameFault MjpegDecoder::decode(Bytes frame, cv::Mat& picture) {
+  if (frame.empty()) return FrameFault::too_short;
+  if (const JpegFault fault = reader_.open(frame); fault != JpegFault::none) return frame_fault(fault);
+  const auto rows = static_cast<std::uint32_t>(picture.rows);
+  if (reader_.header().width != static_cast<std::uint32_t>(picture.cols)) return FrameFault::wrong_size;
+  if (rows % 2 == 0 && reader_.header().height == rows / 2) return decode_fields(frame, picture);
+  if (reader_.header().height != rows) return FrameFault::wrong_size;
+  return frame_fault(reader_.decode(picture));
 }
 
-MjpegDecoder::~MjpegDecoder() {
-  jpeg_destroy_decompress(&state_->jpeg);
-}
+FrameFault MjpegDecoder::decode_fields(Bytes frame, cv::Mat& picture) {
+  // Every second row of the picture, from `first` on.
+  const auto field = [&](std::size_t first) {
+    return cv::Mat(picture.rows / 2, picture.cols, picture.type(), picture.data + first * picture.step[0],
+                   2 * picture.step[0]);
+  };
+  const std::size_t first = lower_lines_first(frame) ? 1 : 0;
+  cv::Mat lines = field(first);
+  if (const FrameFault fault = frame_fault(reader_.decode(lines)); fault != FrameFault::none) return fault;
 
-bool MjpegDecoder::decode(std::span<const std::uint8_t> jpeg, cv::Mat& picture) {
-  state_->errors.num_warnings = 0;
-  return decode_rows(state_->jpeg, state_->escape, jpeg.data(), jpeg.size(), picture.data, picture.step[0],
-                     static_cast<unsigned>(picture.cols), static_cast<unsigned>(picture.rows),
-                     picture.channels() == 3);
+  constexpr std::array<std::uint8_t, 2> start{0xff, 0xd8};
+  const Bytes behind = frame.subspan(reader_.bytes_read());
+  const auto second = std::search(behind.begin(), behind.end(), start.begin(), start.end());
+  if (second == behind.end()) return FrameFault::cut_short;
+  if (const JpegFault fault = reader_.open(Bytes(second, behind.end())); fault != JpegFault::none)
+    return frame_fault(fault);
+  lines = field(1 - first);
+  if (reader_.header().width != static_cast<std::uint32_t>(lines.cols) ||
+      reader_.header().height != static_cast<std::uint32_t>(lines.rows))
+    return FrameFault::wrong_size;
+  return frame_fault(reader_.decode(lines));
 }
 
 }  // namespace eigenpose

@@ -1,31 +1,32 @@
 #pragma once
 
-/// One MJPEG frame to pixels, with libjpeg-turbo itself.
+/// One MJPEG frame to pixels, as cameras send it.
 
 #include <cstdint>
-#include <memory>
 #include <span>
 
 #include <opencv2/core.hpp>
+
+#include "core/image/jpeg_reader.h"
+#include "drivers/camera.h"
 
 namespace eigenpose {
 
 /// Keeps libjpeg's working memory between frames. Lives on one thread.
 class MjpegDecoder {
  public:
-  MjpegDecoder();
-  ~MjpegDecoder();
-  MjpegDecoder(const MjpegDecoder&) = delete;
-  MjpegDecoder& operator=(const MjpegDecoder&) = delete;
-
-  /// Decodes into `picture`: CV_8UC3 (BGR), or CV_8UC1 (luma only, which is much cheaper). Frames without
-  /// Huffman tables, as many cameras send them, are read with the standard ones.
-  /// @return false when the data is damaged, cut short, or of another size; `picture` is then undefined.
-  bool decode(std::span<const std::uint8_t> jpeg, cv::Mat& picture);
+  /// Decodes into `picture`: CV_8UC3 (BGR), or CV_8UC1 (brightness only, which is much cheaper). See
+  /// JpegReader for what is borne: no Huffman tables, padding, stray bytes before a marker, no end marker.
+  ///
+  /// Two images of half the height in one buffer are the fields of an interlaced frame: the first has the
+  /// upper line of each pair, unless its APP0 segment "AVI1" says that it has the lower (2).
+  /// @return what is wrong with the frame; `picture` is then undefined.
+  FrameFault decode(std::span<const std::uint8_t> frame, cv::Mat& picture);
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  FrameFault decode_fields(std::span<const std::uint8_t> frame, cv::Mat& picture);
+
+  JpegReader reader_;
 };
 
 }  // namespace eigenpose

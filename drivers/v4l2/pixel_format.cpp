@@ -82,9 +82,9 @@ PixelDecoder::PixelDecoder(const BufferLayout& layout, bool color) : layout_(lay
 
 PixelDecoder::~PixelDecoder() = default;
 
-bool PixelDecoder::decode(std::span<const std::uint8_t> buffer, cv::Mat& picture) {
+FrameFault PixelDecoder::decode(std::span<const std::uint8_t> buffer, cv::Mat& picture) {
   if (layout_.format == PixelFormat::mjpeg) return mjpeg_->decode(buffer, picture);
-  if (buffer.size() < layout_.bytes()) return false;
+  if (buffer.size() < layout_.bytes()) return FrameFault::too_short;
 
   if (!color_) {
     const auto pixels = static_cast<std::size_t>(layout_.width);
@@ -96,7 +96,7 @@ bool PixelDecoder::decode(std::span<const std::uint8_t> buffer, cv::Mat& picture
         copy_luma(from, picture.ptr(row), pixels, layout_.range);
       }
     }
-    return true;
+    return FrameFault::none;
   }
 
   // OpenCV only reads through these headers.
@@ -110,7 +110,7 @@ bool PixelDecoder::decode(std::span<const std::uint8_t> buffer, cv::Mat& picture
                          data + layout_.stride * static_cast<std::size_t>(layout_.height), layout_.stride);
     cv::cvtColorTwoPlane(luma, chroma, picture, cv::COLOR_YUV2BGR_NV12);
   }
-  return true;
+  return FrameFault::none;
 }
 
 }  // namespace eigenpose

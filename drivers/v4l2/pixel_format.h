@@ -10,6 +10,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "drivers/camera.h"
 #include "drivers/v4l2/luma.h"
 
 namespace eigenpose {
@@ -49,8 +50,8 @@ class PixelDecoder {
   /// CV_8UC3 or CV_8UC1.
   [[nodiscard]] int picture_type() const { return color_ ? CV_8UC3 : CV_8UC1; }
   /// Fills `picture`, which has the layout's size and `picture_type`.
-  /// @return false when the buffer is too short or damaged; `picture` is then undefined.
-  bool decode(std::span<const std::uint8_t> buffer, cv::Mat& picture);
+  /// @return what is wrong with the buffer; `picture` is then undefined.
+  FrameFault decode(std::span<const std::uint8_t> buffer, cv::Mat& picture);
 
  private:
   BufferLayout layout_;

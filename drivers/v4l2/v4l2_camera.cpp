@@ -308,7 +308,7 @@ bool V4l2Camera::drain(std::optional<Candidate>& newest) {
     count(&CameraStatistics::frames_dropped, number - last_number_ - 1);
     last_number_ = number;
     if (buffer->damaged) {
-      count(&CameraStatistics::frames_damaged);
+      count_damaged(FrameFault::marked_by_device);
       stream.give_back(buffer->index);
       continue;
     }
@@ -322,13 +322,16 @@ bool V4l2Camera::drain(std::optional<Candidate>& newest) {
 std::optional<Frame> V4l2Camera::decode(std::optional<Candidate>& newest) {
   Frame frame;
   frame.image = pool_.picture(session_->height, session_->width, session_->decoder->picture_type());
-  const bool good = session_->decoder->decode(newest->buffer.bytes, frame.image);
+  const FrameFault fault = session_->decoder->decode(newest->buffer.bytes, frame.image);
   frame.sequence = newest->number;
   frame.exposure_start = ledger_.exposure_start(newest->buffer, clock_.now());
   session_->stream->give_back(newest->buffer.index);
   newest.reset();
-  count(good ? &CameraStatistics::frames_taken : &CameraStatistics::frames_damaged);
-  if (!good) return std::nullopt;
+  if (fault != FrameFault::none) {
+    count_damaged(fault);
+    return std::nullopt;
+  }
+  count(&CameraStatistics::frames_taken);
   return frame;
 }
 
@@ -338,6 +341,7 @@ Frame V4l2Camera::frame_from_session(TimePoint deadline, const std::stop_token& 
   constexpr unsigned most_empty_wakes = 1000;
   std::optional<Candidate> newest;
   empty_wakes_ = 0;
+  const CameraStatistics before_call = statistics();
   const bool starved = drain(newest);
   // Was every buffer full, then the driver has been throwing frames away since: these are old, a new one is
   // near.
@@ -348,7 +352,12 @@ Frame V4l2Camera::frame_from_session(TimePoint deadline, const std::stop_token& 
       if (auto frame = decode(newest)) return *std::move(frame);
       continue;
     }
-    if (now >= deadline) throw DeviceTimeout(options_.name, "waiting for a frame", "none came in time");
+    if (now >= deadline) {
+      const std::string damage = damage_since(before_call);
+      throw DeviceTimeout(
+          options_.name, "waiting for a frame",
+          damage.empty() ? "none came in time" : "none that could be used came in time (" + damage + ")");
+    }
     const TimePoint stalled = now + options_.stall_after - waited_;
     session_->device->wait(std::min({deadline, stalled, newest ? patience : TimePoint::max()}), wake_up_);
     if (stop.stop_requested()) {
@@ -378,6 +387,22 @@ CameraStatistics V4l2Camera::statistics() const {
 void V4l2Camera::count(std::uint64_t CameraStatistics::*what, std::uint64_t by) {
   const std::lock_guard lock(mutex_);
   statistics_.*what += by;
+}
+
+void V4l2Camera::count_damaged(FrameFault fault) {
+  const std::lock_guard lock(mutex_);
+  ++statistics_.frames_damaged;
+  ++statistics_.damaged_by.at(static_cast<std::size_t>(fault));
+}
+
+std::string V4l2Camera::damage_since(const CameraStatistics& before) const {
+  const CameraStatistics now = statistics();
+  std::string reasons;
+  for (std::size_t i = 0; i < frame_fault_count; ++i)
+    if (const std::uint64_t count = now.damaged_by.at(i) - before.damaged_by.at(i); count > 0)
+      reasons += (reasons.empty() ? "" : ", ") + std::to_string(count) + " " +
+                 std::string(name_of(static_cast<FrameFault>(i)));
+  return reasons;
 }
 
 void V4l2Camera::note(const std::string& text) const {

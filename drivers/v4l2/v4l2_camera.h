@@ -92,6 +92,9 @@ class V4l2Camera final : public Camera {
   /// Gives the buffer back unseen.
   void set_aside(std::optional<Candidate>& newest);
   void count(std::uint64_t CameraStatistics::*what, std::uint64_t by = 1);
+  void count_damaged(FrameFault fault);
+  /// "3 cut short, 1 too short": the damaged frames since `before`; empty when there were none.
+  [[nodiscard]] std::string damage_since(const CameraStatistics& before) const;
   void note(const std::string& text) const;
 
   V4l2CameraOptions options_;

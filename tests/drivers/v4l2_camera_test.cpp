@@ -249,6 +249,25 @@ TEST_F(V4l2CameraTest, PassesOverFramesCutShort) {
   const Frame frame = next();
   EXPECT_EQ(frame.sequence, 3U);
   EXPECT_EQ(camera_->statistics().frames_damaged, 2U);
+  EXPECT_EQ(camera_->statistics().damaged_by.at(static_cast<std::size_t>(FrameFault::too_short)), 2U);
+}
+
+TEST_F(V4l2CameraTest, SaysWhyNoFrameThatCameCouldBeUsed) {
+  open();
+  system_->truncate(1000);
+  try {
+    next(1s);
+    FAIL() << "a frame came";
+  } catch (const DeviceTimeout& late) {
+    EXPECT_THAT(late.what(), testing::ContainsRegex("none that could be used came in time \\([0-9]+ too short\\)"));
+  }
+  const CameraStatistics counts = camera_->statistics();
+  EXPECT_GT(counts.frames_damaged, 10U);
+  std::uint64_t sum = 0;
+  for (const std::uint64_t count : counts.damaged_by) sum += count;
+  EXPECT_EQ(sum, counts.frames_damaged);
+  system_->truncate(0);
+  EXPECT_NO_THROW(next());
 }
 
 TEST_F(V4l2CameraTest, OffersABufferAgainThatTheDriverRefused) {

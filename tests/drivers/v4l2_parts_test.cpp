@@ -142,7 +142,7 @@ TEST(PixelDecoder, MakesYuyvAndNv12IntoTheSameBgr) {
     const bool packed = format == PixelFormat::yuyv;
     PixelDecoder decoder({format, width, height, packed ? stride : nv12_stride, LumaRange::limited}, true);
     cv::Mat picture(height, width, CV_8UC3);
-    ASSERT_TRUE(decoder.decode(packed ? yuyv : nv12, picture));
+    ASSERT_EQ(decoder.decode(packed ? yuyv : nv12, picture), FrameFault::none);
     for (int row = 0; row < height; ++row) {
       for (int column = 0; column < width; ++column) {
         for (int channel = 0; channel < 3; ++channel) {
@@ -163,7 +163,8 @@ TEST(PixelDecoder, ReadsLumaOfEveryFormatTheSame) {
   const cv::Mat expected(height, width, CV_8UC1, const_cast<std::uint8_t*>(luma.data()));
   const auto decoded = [&](PixelFormat format, std::size_t stride, const std::vector<std::uint8_t>& bytes) {
     cv::Mat picture(height, width, CV_8UC1);
-    EXPECT_TRUE(PixelDecoder({format, width, height, stride, LumaRange::full}, false).decode(bytes, picture));
+    EXPECT_EQ(PixelDecoder({format, width, height, stride, LumaRange::full}, false).decode(bytes, picture),
+              FrameFault::none);
     return picture;
   };
   EXPECT_EQ(cv::norm(decoded(PixelFormat::grey, width, luma), expected, cv::NORM_INF), 0.0);
@@ -174,8 +175,8 @@ TEST(PixelDecoder, ReadsLumaOfEveryFormatTheSame) {
 TEST(PixelDecoder, RefusesABufferThatIsTooShort) {
   PixelDecoder decoder({PixelFormat::yuyv, 16, 4, 32, LumaRange::limited}, true);
   cv::Mat picture(4, 16, CV_8UC3);
-  EXPECT_FALSE(decoder.decode(std::vector<std::uint8_t>(32 * 4 - 1), picture));
-  EXPECT_TRUE(decoder.decode(std::vector<std::uint8_t>(32 * 4), picture));
+  EXPECT_EQ(decoder.decode(std::vector<std::uint8_t>(32 * 4 - 1), picture), FrameFault::too_short);
+  EXPECT_EQ(decoder.decode(std::vector<std::uint8_t>(32 * 4), picture), FrameFault::none);
 }
 
 cv::Mat gradient() {
@@ -189,7 +190,7 @@ cv::Mat gradient() {
   return picture;
 }
 
-std::vector<std::uint8_t> jpeg_of(const cv::Mat& picture) {
+std::vector<std::uint8_t> encoded(const cv::Mat& picture) {
   std::vector<std::uint8_t> jpeg;
   cv::imencode(".jpg", picture, jpeg, {cv::IMWRITE_JPEG_QUALITY, 95});
   return jpeg;
@@ -215,44 +216,46 @@ std::vector<std::uint8_t> without_tables(const std::vector<std::uint8_t>& jpeg) 
 
 TEST(MjpegDecoding, GivesThePictureInColourAndInGrey) {
   const cv::Mat picture = gradient();
-  const auto jpeg = jpeg_of(picture);
+  const auto jpeg = encoded(picture);
   cv::Mat color(48, 64, CV_8UC3), grey(48, 64, CV_8UC1), expected_grey;
   cv::cvtColor(picture, expected_grey, cv::COLOR_BGR2GRAY);
-  ASSERT_TRUE(PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true).decode(jpeg, color));
-  ASSERT_TRUE(PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, false).decode(jpeg, grey));
+  ASSERT_EQ(PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true).decode(jpeg, color),
+            FrameFault::none);
+  ASSERT_EQ(PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, false).decode(jpeg, grey),
+            FrameFault::none);
   // What quality 95 loses on a smooth gradient, on average.
   EXPECT_LT(cv::norm(color, picture, cv::NORM_L1) / (64 * 48 * 3), 2.0);
   EXPECT_LT(cv::norm(grey, expected_grey, cv::NORM_L1) / (64 * 48), 2.0);
 }
 
 TEST(MjpegDecoding, UsesTheStandardTablesWhereTheCameraSendsNone) {
-  const auto jpeg = jpeg_of(gradient());
+  const auto jpeg = encoded(gradient());
   const auto stripped = without_tables(jpeg);
   ASSERT_LT(stripped.size(), jpeg.size() - 300);
   PixelDecoder decoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true);
   cv::Mat whole(48, 64, CV_8UC3), bare(48, 64, CV_8UC3);
-  ASSERT_TRUE(decoder.decode(stripped, bare));
-  ASSERT_TRUE(decoder.decode(jpeg, whole));
+  ASSERT_EQ(decoder.decode(stripped, bare), FrameFault::none);
+  ASSERT_EQ(decoder.decode(jpeg, whole), FrameFault::none);
   EXPECT_EQ(cv::norm(whole, bare, cv::NORM_INF), 0.0);
 }
 
 TEST(MjpegDecoding, SurvivesEveryKindOfDamageAndDecodesTheNextFrame) {
-  const auto jpeg = jpeg_of(gradient());
+  const auto jpeg = encoded(gradient());
   PixelDecoder decoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true);
   cv::Mat picture(48, 64, CV_8UC3);
   for (std::size_t length = 0; length + 2 < jpeg.size(); length += 7) {
-    EXPECT_FALSE(decoder.decode(std::span(jpeg).first(length), picture)) << length;
+    EXPECT_NE(decoder.decode(std::span(jpeg).first(length), picture), FrameFault::none) << length;
   }
-  EXPECT_FALSE(decoder.decode(random_bytes(5000), picture));
-  EXPECT_FALSE(decoder.decode(jpeg_of(cv::Mat(32, 64, CV_8UC3, cv::Scalar(1, 2, 3))), picture))
-      << "another size";
+  EXPECT_EQ(decoder.decode(random_bytes(5000), picture), FrameFault::no_image);
+  EXPECT_EQ(decoder.decode(encoded(cv::Mat(32, 64, CV_8UC3, cv::Scalar(1, 2, 3))), picture),
+            FrameFault::wrong_size);
   std::mt19937 random(3);
   for (int i = 0; i < 300; ++i) {  // flipped bits may pass unseen, but must not break anything
     auto damaged = jpeg;
     damaged[random() % damaged.size()] ^= static_cast<std::uint8_t>(1U << random() % 8);
     decoder.decode(damaged, picture);
   }
-  EXPECT_TRUE(decoder.decode(jpeg, picture));
+  EXPECT_EQ(decoder.decode(jpeg, picture), FrameFault::none);
 }
 
 TEST(FramePool, UsesMemoryAgainOnceItWasLetGo) {
