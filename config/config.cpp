@@ -17,10 +17,9 @@ using std::chrono::milliseconds;
 
 constexpr double no_limit = 1e9;  ///< for positions: any machine ends before
 
-milliseconds read_ms(const TomlTable& table, std::string_view key, milliseconds fallback, double lower,
-                     double upper) {
-  const double value = table.number(key, static_cast<double>(fallback.count()), lower, upper);
-  return milliseconds(static_cast<milliseconds::rep>(value));
+milliseconds read_ms(const TomlTable& table, std::string_view key, milliseconds fallback, std::int64_t lower,
+                     std::int64_t upper) {
+  return milliseconds(table.integer(key, fallback.count(), lower, upper));
 }
 
 std::filesystem::path read_path(const TomlTable& table, std::string_view key, const std::string& fallback,

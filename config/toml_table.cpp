@@ -4,7 +4,6 @@
 #include <cmath>
 #include <fstream>
 #include <numeric>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -52,6 +51,49 @@ std::optional<std::string> nearest(std::string_view key, const std::vector<std::
   throw ConfigError(fmt::format("{}:{}: {}", file, where.begin.line, what));
 }
 
+/// The number of keys joined by dots is bounded: the parser would nest one table for each.
+constexpr int most_dots = 32;
+constexpr std::size_t most_bytes = std::size_t{1} << 20U;
+
+/// Walks over TOML text from one sign that matters for structure to the next, past strings and comments.
+class TomlScanner {
+ public:
+  explicit TomlScanner(std::string_view text) : text_(text) {}
+
+  /// The line of the first key that joins more than `most_dots`; nothing if there is none.
+  std::optional<std::size_t> deep_key() {
+    int dots = 0;
+    while (at_ < text_.size()) {
+      const char c = text_[at_];
+      if (c == '"' || c == '\'') {
+        skip_string(c);
+        continue;
+      }
+      if (c == '#') at_ = std::min(text_.find('\n', at_), text_.size());
+      if (c == '.' && ++dots > most_dots)
+        return 1 + static_cast<std::size_t>(
+                       std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
+      if (c == '\n' || c == ',' || c == '=' || c == '{' || c == '[') dots = 0;
+      ++at_;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  void skip_string(char quote) {
+    const std::string end(text_.substr(at_, 3) == std::string(3, quote) ? 3 : 1, quote);
+    at_ += end.size();
+    while (at_ < text_.size() && text_.substr(at_, end.size()) != end) {
+      if (end.size() == 1 && text_[at_] == '\n') return;  // not TOML: the parser will say so
+      at_ += quote == '"' && text_[at_] == '\\' ? 2 : 1;
+    }
+    at_ += end.size();
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;
+};
+
 }  // namespace
 
 struct TomlTable::Impl {
@@ -89,12 +131,19 @@ TomlTable TomlTable::read_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream || std::filesystem::is_directory(file))
     throw ConfigError(file.string() + ": cannot be read: give the configuration with --config FILE");
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return parse(text.str(), file.string());
+  // One byte more than is allowed: a device may have no end.
+  std::string text(most_bytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return parse(text, file.string());
 }
 
 TomlTable TomlTable::parse(std::string_view text, const std::string& name) {
+  if (text.size() > most_bytes)
+    throw ConfigError(fmt::format("{}: more than {} bytes are no configuration", name, most_bytes));
+  if (const auto line = TomlScanner(text).deep_key())
+    throw ConfigError(
+        fmt::format("{}:{}: a key joins more than {} names by dots", name, *line, most_dots + 1));
   auto impl = std::make_shared<Impl>();
   try {
     impl->root = std::make_shared<const toml::table>(toml::parse(text));
@@ -228,6 +277,7 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
   const toml::node* node = impl_->find(key);
   std::vector<TomlTable> result;
   if (node == nullptr) return result;
+  if (node->is_array() && node->as_array()->empty()) return result;
   if (!node->is_array_of_tables())
     impl_->fail(*node, key, fmt::format("a list of tables is needed: [[{}]]", key));
   for (const toml::node& element : *node->as_array())

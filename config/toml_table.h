@@ -3,6 +3,9 @@
 /// One table of a TOML file, read key by key. What was not asked for when `finish` is called is an unknown
 /// key.
 ///
+/// TOML 1.0. Values are never converted: an integer is taken where a floating-point number is needed, and
+/// nothing else for another kind. At most 1 MiB, values nested at most 256 deep, 33 names joined by dots.
+///
 /// Every failure is a ConfigError "FILE:LINE: what: what is allowed". One thread at a time.
 
 #include <cstdint>
@@ -30,9 +33,10 @@ class TomlTable {
   /// A value, or `fallback` when the key is absent; without `fallback` the key is required.
   [[nodiscard]] std::string text(std::string_view key, std::optional<std::string> fallback = {}) const;
   [[nodiscard]] bool flag(std::string_view key, std::optional<bool> fallback = {}) const;
-  /// A number in [lower, upper].
+  /// A finite number in [lower, upper].
   [[nodiscard]] double number(std::string_view key, std::optional<double> fallback, double lower,
                               double upper) const;
+  /// A whole number in [lower, upper], written as one: 20.0 is refused.
   [[nodiscard]] std::int64_t integer(std::string_view key, std::optional<std::int64_t> fallback,
                                      std::int64_t lower, std::int64_t upper) const;
   /// One of `allowed`.

@@ -121,7 +121,9 @@ TEST(ModbusProfile, ImpossibleValuesAreRefused) {
   EXPECT_THAT(complaint(with("kind = \"drive\"", "kind = \"lamp\"")), HasSubstr("drive.toml:2: "));
   EXPECT_THAT(complaint(with("bits = 32", "bits = 24")), HasSubstr("24"));
   EXPECT_THAT(complaint(with("register = 0x20", "register = 65536")), HasSubstr("65536"));
-  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 16 }")), HasSubstr("16"));
+  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 16 }")), HasSubstr("0 to 15"));
+  EXPECT_THAT(complaint(with("bit = 1 }", "bit = -1 }")), HasSubstr("0 to 15"));
+  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 31 }")), HasSubstr("0 to 15"));
   EXPECT_THAT(complaint(with("\"position:32\"", "\"position:24\"")), HasSubstr("position:24"));
   EXPECT_THAT(complaint(with("\"position:32\"", "\"positron:32\"")), HasSubstr("positron"));
   EXPECT_THAT(complaint(with("\"1:16\"", "\"65536:16\"")), HasSubstr("65536"));
