@@ -21,7 +21,7 @@ class AppearanceMaker {
   /// The appearance is the picture itself: nothing needs to be made.
   [[nodiscard]] bool is_picture() const { return parts_.empty(); }
 
-  /// @param picture picture_length(options) numbers. @param appearance appearance_length(options) numbers.
+  /// @param picture picture_length(options) components. @param appearance appearance_length(options) ones.
   /// @return its energy ‖appearance‖; 0 where nothing is to be seen.
   float make(std::span<const float> picture, std::span<float> appearance);
 
@@ -29,7 +29,7 @@ class AppearanceMaker {
   struct Part {
     std::unique_ptr<ImageType> type;
     std::size_t bands = 1;
-    float weight = 1.0F;  ///< of its unit-energy numbers
+    float weight = 1.0F;  ///< of its unit-energy components
   };
   int size_ = 0;
   int picture_bands_ = 1;

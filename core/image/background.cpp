@@ -11,7 +11,7 @@ using Histogram = std::array<int, 256>;
 
 constexpr int samples_wanted = 4000;
 
-/// Rows apart and columns apart, so that about `samples_wanted` pixels are looked at. Odd, so that periodic
+/// Rows apart and columns apart, so that about `samples_wanted` pixels are sampled. Odd, so that periodic
 /// patterns do not fall into step.
 int sample_step(const cv::Mat& image) {
   const double pixels = static_cast<double>(image.rows) * image.cols;

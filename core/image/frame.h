@@ -16,8 +16,8 @@ struct Frame {
   cv::Mat image;
   /// No photon of this picture is older than this. Compare with the time an axis settled.
   TimePoint exposure_start{};
-  /// Counts every picture the camera took, also those nobody fetched; never goes back while the camera is
-  /// open.
+  /// Counts every picture the camera took, also those that were not fetched; never goes back while the camera
+  /// is open.
   std::uint64_t sequence = 0;
 };
 

@@ -27,18 +27,18 @@ struct PictureView {
   }
 };
 
-/// One way to turn a picture into numbers. Holds scratch memory: one thread at a time; allocates nothing
+/// One way to make an appearance of a picture. Holds scratch memory: one thread at a time; allocates nothing
 /// after construction.
 ///
-/// Every type is homogeneous: c times the picture gives a positive multiple of the same numbers for c > 0. So
-/// brightness cancels out once the numbers are of unit energy.
+/// Every type is homogeneous: c times the picture gives a positive multiple of the same components for c > 0.
+/// So brightness cancels out at unit energy.
 class ImageType {
  public:
   ImageType() = default;
   ImageType(const ImageType&) = delete;
   ImageType& operator=(const ImageType&) = delete;
   virtual ~ImageType() = default;
-  /// @param out size × size × bands numbers, those of a pixel together.
+  /// @param out size × size × bands components, those of a pixel together.
   virtual void make(const PictureView& picture, std::span<float> out) = 0;
 };
 
@@ -72,7 +72,7 @@ struct ImageTypeSum {
     double weight = 1.0;  ///< share; all sum up to 1
   };
   std::vector<Part> parts;
-  int bands = 0;                               ///< numbers a pixel: those of all parts
+  int bands = 0;                               ///< components a pixel: those of all parts
   PictureNeed need = PictureNeed::brightness;  ///< never `any`
 };
 

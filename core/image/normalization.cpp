@@ -18,7 +18,7 @@ float luma(float blue, float green, float red) {
 /// A pixel of range counts as measured when this share of its area was.
 constexpr float least_measured = 0.5F;
 
-/// Of colour pixels: out[3j…] = Σ weights[j·taps + s] · pixel first[j] + s, j < count. Four numbers at once:
+/// Of colour pixels: out[3j…] = Σ weights[j·taps + s] · pixel first[j] + s, j < count. Four floats at once:
 /// a pixel and the first of the next, which is overwritten by the next; one more than is wanted is read and
 /// written at the end. `Taps` is `taps`, or 0 for any.
 template <int Taps>
@@ -159,13 +159,13 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
     throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
                                 cv::typeToString(cut.type()));
   if (options_.color && cut.channels() != 3)
-    throw std::invalid_argument("the model was learned in colour, the picture is grey; learn with --grey");
+    throw std::invalid_argument("the image type is in colour, the picture is grey; take the type \"grey\"");
   if (range_ && cut.type() != CV_16UC1)
     throw std::invalid_argument("the model was learned from range, the picture is not 16-bit grey but " +
                                 cv::typeToString(cut.type()));
   if (picture.size() != length())
     throw std::invalid_argument("a normalised picture has " + std::to_string(length()) +
-                                " numbers, room is for " + std::to_string(picture.size()));
+                                " components, room is for " + std::to_string(picture.size()));
   const auto n = static_cast<std::size_t>(options_.size);
   const auto bands = range_ ? std::size_t{2} : static_cast<std::size_t>(picture_bands(options_));
   const auto width = static_cast<std::size_t>(cut.cols) * bands;

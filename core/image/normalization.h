@@ -37,17 +37,18 @@ void set_image_type(NormalizationOptions& options, const std::string& type);
 /// The type's name, also where it is kept empty.
 std::string image_type_name(const NormalizationOptions& options);
 
-/// Numbers of one normalised picture: size × size × bands. Order: row by row, in a row pixel by pixel, in a
-/// pixel blue, green, red (or grey alone).
+/// Components of one normalised picture: size × size × bands. Order: row by row, in a row pixel by pixel, in
+/// a pixel blue, green, red (or grey alone).
 std::size_t picture_length(const NormalizationOptions& options);
 /// 3 or 1.
 int picture_bands(const NormalizationOptions& options);
 /// Pictures are 16-bit range: not brightness.
 bool is_range(const NormalizationOptions& options);
 
-/// Numbers of one appearance, which the image type makes of a picture: size × size × bands in the same order.
+/// Components of one appearance, which the image type makes of a picture: size × size × bands in the same
+/// order.
 std::size_t appearance_length(const NormalizationOptions& options);
-/// Numbers a pixel: 3 or 1, more for sums of image types.
+/// Components a pixel: 3 or 1, more for sums of image types.
 int appearance_bands(const NormalizationOptions& options);
 /// The appearance is the picture itself: brightness, in colour or grey.
 bool appearance_is_picture(const NormalizationOptions& options);
@@ -73,7 +74,7 @@ class Normalizer {
   /// @param cut CV_8UC1, CV_8UC3 or CV_16UC1; for range CV_16UC1. A grey model takes colour pictures; a
   /// colour model refuses grey ones.
   /// @param level the background's level in each band, subtracted from every pixel (not below 0).
-  /// @param picture `length()` numbers.
+  /// @param picture `length()` components.
   /// @return its energy ‖picture‖; 0 for a black region, which has no direction.
   /// @throws std::invalid_argument for a picture of the wrong kind.
   float normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3>& level, std::span<float> picture);
