@@ -259,7 +259,8 @@ TEST_F(V4l2CameraTest, SaysWhyNoFrameThatCameCouldBeUsed) {
     next(1s);
     FAIL() << "a frame came";
   } catch (const DeviceTimeout& late) {
-    EXPECT_THAT(late.what(), testing::ContainsRegex("none that could be used came in time \\([0-9]+ too short\\)"));
+    EXPECT_THAT(late.what(),
+                testing::ContainsRegex("none that could be used came in time \\([0-9]+ too short\\)"));
   }
   const CameraStatistics counts = camera_->statistics();
   EXPECT_GT(counts.frames_damaged, 10U);
