@@ -25,7 +25,8 @@ cv::Vec3f as_pixel(Vec3 colour) {
   return {colour.z, colour.y, colour.x};
 }  // OpenCV keeps blue first
 
-/// Pixels in which points are seen, cut to the picture and widened to even numbers.
+/// The smallest rectangle around the pixels in which points are seen, cut to the picture and widened to even
+/// coordinates. Empty when all points lie outside the picture.
 class SeenRect {
  public:
   SeenRect(const Pinhole& camera, cv::Size size) : camera_(camera), size_(size) {}
@@ -45,8 +46,10 @@ class SeenRect {
     };
     const int x = even(left_ - margin, size_.width);
     const int y = even(top_ - margin, size_.height);
-    return {x, y, even(right_ + margin + 2.0F, size_.width) - x,
-            even(bottom_ + margin + 2.0F, size_.height) - y};
+    const int width = even(right_ + margin + 2.0F, size_.width) - x;
+    const int height = even(bottom_ + margin + 2.0F, size_.height) - y;
+    if (width <= 0 || height <= 0) return {};
+    return {x, y, width, height};
   }
 
  private:
@@ -94,6 +97,7 @@ struct Renderer::Canvas {
     draw_on(stage, camera, light, tracer);
   }
   void draw_on(const Renderer::Stage& stage, const Pinhole& camera, const Light& light, const Tracer& tracer);
+  void mark(const cv::Rect& rect, std::uint8_t cast);
   void cast_once(const Renderer::Stage& stage, const Pinhole& camera, const Tracer& tracer, int row);
   void refine_edges(const Renderer::Stage& stage, const Pinhole& camera, const Tracer& tracer,
                     cv::Mat& picture, int y) const;
@@ -116,9 +120,14 @@ void Renderer::Canvas::draw_on(const Renderer::Stage& stage, const Pinhole& came
       shadow.include(shadow_of(point, light.position, 0.0F));
       shadow.include(shadow_of(point, light.position, -stage::table_height_mm));
     }
-    active(seen.rect()) |= may_hit_body;
-    active(shadow.rect()) |= may_be_shadowed;
+    mark(seen.rect(), may_hit_body);
+    mark(shadow.rect(), may_be_shadowed);
   }
+}
+
+// OpenCV refuses arithmetic on a matrix without pixels.
+void Renderer::Canvas::mark(const cv::Rect& rect, std::uint8_t cast) {
+  if (!rect.empty()) active(rect) |= cast;
 }
 
 // Two by two pixels at once. Where the table is seen, all of them share one look at the lamp: it is nearly

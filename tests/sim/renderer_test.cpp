@@ -1,5 +1,7 @@
 #include "sim/scene/renderer.h"
 
+#include <array>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
@@ -136,6 +138,56 @@ TEST(Renderer, AHandIsSeenAndObjectsHideEachOther) {
   cv::Mat inner;
   cv::erode(mask, inner, cv::Mat(), {-1, -1}, 3);
   EXPECT_LT(cv::norm(both, front, cv::NORM_L1, inner) / cv::norm(front, cv::NORM_L1, inner), 0.03);
+}
+
+TEST(Renderer, AHandComesInFromOutsideThePicture) {
+  for (const cv::Size size : {cv::Size(320, 240), cv::Size(64, 240), cv::Size(240, 64)}) {
+    Renderer renderer({.width = size.width, .height = size.height});
+    SceneState scene = scene_with("duck", 0.0);
+    const cv::Mat alone = renderer.render(scene);
+    double before = 0.0;
+    bool came = false;
+    for (const double reach : {0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0}) {
+      scene.hand = reach;
+      const double change = relative_difference(alone, renderer.render(scene));
+      if (reach == 0.0) {
+        EXPECT_EQ(change, 0.0) << "outside the picture, and yet seen";
+      }
+      came = came || change > 0.05;
+      EXPECT_GE(change, 0.5 * before) << "at " << reach;
+      before = change;
+    }
+    EXPECT_TRUE(came) << size;
+  }
+}
+
+TEST(Renderer, WhatStandsOutsideThePictureIsNotSeenAndDoesNoHarm) {
+  Renderer renderer({.width = 160, .height = 120});
+  const cv::Mat empty = renderer.render({});
+  for (const auto& [x, y, z] : {std::array{-900.0, 0.0, 0.0},
+                                {900.0, 0.0, 0.0},
+                                {0.0, 900.0, 900.0},
+                                {0.0, -900.0, -900.0},
+                                {0.0, 0.0, 1200.0},
+                                {900.0, 900.0, 900.0},
+                                {0.0, -2200.0, 1500.0}}) {
+    SceneState scene;
+    scene.objects = {{"duck", 10.0, x, y, z}};
+    const cv::Mat picture = renderer.render(scene);
+    EXPECT_LT(relative_difference(empty, picture), 0.5) << x << ", " << y << ", " << z;
+    EXPECT_EQ(cv::countNonZero(foreground(picture)), 0) << x << ", " << y << ", " << z;
+  }
+}
+
+TEST(Renderer, AnObjectAtTheBorderIsCutThere) {
+  Renderer renderer({.width = 160, .height = 120});
+  SceneState scene = scene_with("mug", 0.0);
+  const int whole = cv::countNonZero(foreground(renderer.render(scene)));
+  scene.objects[0].x_mm = -150.0;  // half of the field's width
+  const cv::Mat mask = foreground(renderer.render(scene));
+  EXPECT_GT(cv::countNonZero(mask), whole / 4);
+  EXPECT_LT(cv::countNonZero(mask), 3 * whole / 4);
+  EXPECT_GT(cv::countNonZero(mask.col(0)), 0) << "nothing touches the border";
 }
 
 TEST(Renderer, BouncedLightOnlyAdds) {
