@@ -12,7 +12,7 @@ double longest_unhomed_jog(const Dof& dof) {
 
 double Axis::jog(double distance, TimePoint deadline, std::stop_token stop) {
   const Dof& dof = info().dof;
-  check_jog(dof.name, dof, distance, true);
+  check_jog(dof.name, dof, distance);
   const AxisState now = state(deadline);
   if (!now.homed) throw DeviceError(dof.name, "jog", "not homed; home the axis first");
   return move_to(dof.canonical(now.position + distance), deadline, std::move(stop));

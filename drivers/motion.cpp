@@ -1,5 +1,6 @@
 #include "drivers/motion.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -25,25 +26,23 @@ void MotionGate::interrupt() {
   if (current_ != nullptr) current_->request_stop();
 }
 
-MotionWatch::MotionWatch(std::string device, std::string operation, Dof dof, Goal goal, double target,
-                         double tolerance, MotionPatience patience, TimePoint now)
-    : device_(std::move(device)),
-      operation_(std::move(operation)),
-      dof_(std::move(dof)),
-      goal_(goal),
-      target_(target),
-      tolerance_(tolerance),
-      patience_(patience),
-      start_(now),
-      last_change_(now),
-      still_since_(now) {}
+MotionWatch::MotionWatch(MotionOrder order, TimePoint now)
+    : order_(std::move(order)), start_(now), last_change_(now), still_since_(now) {}
 
 std::string MotionWatch::in_words(double position) const {
-  return fmt::format("{:.3f} {}", dof_.canonical(position), dof_.unit);
+  return fmt::format("{:.3f} {}", order_.dof.canonical(position), order_.dof.unit);
 }
 
 void MotionWatch::fail(const std::string& cause) const {
-  throw DeviceError(device_, operation_, cause);
+  throw DeviceError(order_.device, order_.operation, cause);
+}
+
+bool MotionWatch::stands_at_goal(const MotionReading& reading, TimePoint now) const {
+  if (!reading.in_position) return false;
+  if (order_.goal == MotionOrder::Goal::target)
+    return std::abs(reading.position - order_.target) <= order_.tolerance;
+  // Homing may end where it began; only the start time tells that from a drive that has not begun yet.
+  return reading.homed && (moved_at_all_ || now - start_ >= order_.patience.start_time);
 }
 
 bool MotionWatch::arrived(const MotionReading& reading, TimePoint now, TimePoint deadline) {
@@ -53,27 +52,72 @@ bool MotionWatch::arrived(const MotionReading& reading, TimePoint now, TimePoint
 
   if (reading.moving) {
     moving_ = moved_at_all_ = true;
-    if (now - last_change_ >= patience_.stall_time)
+    if (now - last_change_ >= order_.patience.stall_time)
       fail("the motor is stuck at " + in_words(reading.position));
   } else {
     if (moving_) still_since_ = now;
     moving_ = false;
-    // Homing may end where it began; a drive that has not begun yet is told from that by the start time only.
-    const bool there = goal_ == Goal::target
-                           ? std::abs(reading.position - target_) <= tolerance_
-                           : reading.homed && (moved_at_all_ || now - start_ >= patience_.start_time);
-    if (there && reading.in_position) return true;
-    if (now - still_since_ >= (moved_at_all_ ? patience_.settle_time : patience_.start_time)) {
-      if (goal_ == Goal::home) fail("the drive stands still and is not homed");
+    if (stands_at_goal(reading, now)) return true;
+    const Duration patience = moved_at_all_ ? order_.patience.settle_time : order_.patience.start_time;
+    if (now - still_since_ >= patience) {
+      if (order_.goal == MotionOrder::Goal::home) fail("the drive stands still and is not homed");
       fail(fmt::format("{} at {}, not at {}: blocked, or steps were lost",
                        moved_at_all_ ? "it stopped" : "it did not move and stands",
-                       in_words(reading.position), in_words(target_)));
+                       in_words(reading.position), in_words(order_.target)));
     }
   }
   if (now >= deadline)
-    throw DeviceTimeout(device_, operation_,
+    throw DeviceTimeout(order_.device, order_.operation,
                         "not there by the deadline; it is at " + in_words(reading.position));
   return false;
+}
+
+namespace {
+
+/// The same failure with what became of the motor behind its cause.
+template <class Failure>
+[[noreturn]] void rethrow_with(const Failure& failure, const std::string& consequence) {
+  const std::string cause =
+      std::string(failure.what()).substr(failure.device().size() + failure.operation().size() + 4);
+  throw Failure(failure.device(), failure.operation(), cause + "; " + consequence);
+}
+
+}  // namespace
+
+void heed(const std::stop_token& stop, const std::string& device, const std::string& operation) {
+  if (stop.stop_requested()) throw Interrupted(device + ": " + operation + ": interrupted on request");
+}
+
+MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, const Clock& clock,
+                        TimePoint deadline, const std::stop_token& stop) {
+  try {
+    MotionWatch watch(order, clock.now());
+    heed(stop, order.device, order.operation);
+    steps.start();
+    for (;;) {
+      heed(stop, order.device, order.operation);
+      const MotionReading reading = steps.read();
+      const TimePoint now = clock.now();
+      if (watch.arrived(reading, now, deadline)) {
+        steps.finish();
+        return reading;
+      }
+      clock.sleep_until(std::min(deadline, now + order.patience.poll_interval), stop);
+    }
+  } catch (const Interrupted&) {
+    steps.halt();
+    throw;
+  } catch (const DeviceTimeout& failure) {
+    rethrow_with(failure, steps.halt());
+  } catch (const DeviceLost& failure) {
+    rethrow_with(failure, steps.halt());
+  } catch (const DeviceError& failure) {
+    const std::string consequence = steps.halt();
+    if (stop.stop_requested())
+      throw Interrupted(failure.device() + ": " + failure.operation() + ": interrupted on request; " +
+                        consequence);
+    rethrow_with(failure, consequence);
+  }
 }
 
 double nearest_target(const Dof& dof, double position, double from) {
@@ -86,13 +130,16 @@ void check_target(const std::string& device, const Dof& dof, double position) {
         fmt::format("{}: {} {} is outside {} … {}", device, position, dof.unit, dof.lower, dof.upper));
 }
 
-void check_jog(const std::string& device, const Dof& dof, double distance, bool homed) {
+void check_jog(const std::string& device, const Dof& dof, double distance) {
   const double range = dof.upper - dof.lower;
   if (!(std::abs(distance) <= range))
     throw std::out_of_range(fmt::format("{}: a jog by {} {} is longer than the range of {} {}", device,
                                         distance, dof.unit, range, dof.unit));
+}
+
+void check_unhomed_jog(const std::string& device, const Dof& dof, double distance) {
   const double longest = longest_unhomed_jog(dof);
-  if (!homed && std::abs(distance) > longest)
+  if (!(std::abs(distance) <= longest))
     throw std::out_of_range(fmt::format(
         "{}: not homed, so its limits are not known: {:g} {} at most in one go; home it first, or jog less",
         device, longest, dof.unit));

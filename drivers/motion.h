@@ -1,7 +1,7 @@
 #pragma once
 
-/// What every axis driver does alike while its motor turns: be interruptible, and judge from what is read
-/// back whether the axis has arrived. For drivers only.
+/// What every axis driver does alike while its motor turns: it can be interrupted, and it judges by what is
+/// read back whether the axis has arrived. For drivers only.
 
 #include <chrono>
 #include <functional>
@@ -45,12 +45,14 @@ class MotionGate {
 
 /// How patient a driver is with its motor.
 struct MotionPatience {
-  Duration poll_interval = std::chrono::milliseconds(20);  ///< between two looks at a moving axis
-  Duration start_time = std::chrono::milliseconds(500);    ///< within which a command must show effect
-  Duration settle_time =
-      std::chrono::milliseconds(500);  ///< within which a motor that has stopped is at its target
-  Duration stall_time =
-      std::chrono::seconds(2);  ///< a position that does not change for so long is a stuck motor
+  /// Between two readings of a moving axis.
+  Duration poll_interval = std::chrono::milliseconds(20);
+  /// Within this time a command must show effect.
+  Duration start_time = std::chrono::milliseconds(500);
+  /// Within this time a motor that has stopped is at its target.
+  Duration settle_time = std::chrono::milliseconds(500);
+  /// A moving motor whose position does not change for this time is stuck.
+  Duration stall_time = std::chrono::seconds(2);
 };
 
 /// What a drive said at one moment.
@@ -59,35 +61,38 @@ struct MotionReading {
   bool in_position = true;  ///< within the drive's own window, where it has one
   bool homed = false;
   std::optional<std::string> alarm;  ///< in words
-  double position =
-      0.0;  ///< read after the flags; in the axis's unit, not canonical: it counts on over whole turns
+  /// Read after the flags; in the axis's unit, not canonical: it counts on over whole turns.
+  double position = 0.0;
+};
+
+/// One motion, and whose it is.
+struct MotionOrder {
+  enum class Goal { target, home };
+
+  std::string device;     ///< opens the text of every error
+  std::string operation;  ///< "move to 30 deg"
+  Dof dof;
+  Goal goal = Goal::target;
+  double target = 0.0;     ///< where a move ends, not canonical; ignored for Goal::home
+  double tolerance = 0.0;  ///< |position − target| that counts as arrived, in the unit
+  MotionPatience patience;
 };
 
 /// Judges one motion by its readings. Lives on one thread.
 class MotionWatch {
  public:
-  enum class Goal { target, home };
-
-  /// @param target where a move ends, not canonical; ignored for Goal::home.
-  /// @param tolerance |position − target| that counts as arrived, in the unit.
-  MotionWatch(std::string device, std::string operation, Dof dof, Goal goal, double target, double tolerance,
-              MotionPatience patience, TimePoint now);
+  MotionWatch(MotionOrder order, TimePoint now);
 
   /// True when the axis stands where it should. @throws DeviceError on an alarm, a motor that does not start,
   /// is stuck, or has stopped elsewhere; DeviceTimeout when `now` has reached `deadline`.
   bool arrived(const MotionReading& reading, TimePoint now, TimePoint deadline);
 
  private:
+  [[nodiscard]] bool stands_at_goal(const MotionReading& reading, TimePoint now) const;
   [[nodiscard]] std::string in_words(double position) const;
   [[noreturn]] void fail(const std::string& cause) const;
 
-  std::string device_;
-  std::string operation_;
-  Dof dof_;
-  Goal goal_;
-  double target_;
-  double tolerance_;
-  MotionPatience patience_;
+  MotionOrder order_;
   TimePoint start_;
   TimePoint last_change_;
   TimePoint still_since_;
@@ -95,6 +100,21 @@ class MotionWatch {
   bool moved_at_all_ = false;
   std::optional<double> last_position_;
 };
+
+/// What a driver does in the course of one motion.
+struct MotionSteps {
+  std::function<void()> start;          ///< sends the command; nothing moves before
+  std::function<MotionReading()> read;  ///< asks the drive
+  std::function<void()> finish;         ///< after arrival
+  /// After every failure: tells the drive to stop and says in words what became of it. Does not throw.
+  std::function<std::string()> halt;
+};
+
+/// Starts the motion and waits until it has arrived. @return the last reading.
+/// @throws what `steps` and MotionWatch throw, each with the words of `halt` behind its cause; Interrupted
+/// when `stop` was requested, also in the place of a failure that the stop has brought about.
+MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, const Clock& clock,
+                        TimePoint deadline, const std::stop_token& stop);
 
 /// Where to send a drive that counts on over whole turns: the position congruent to `position` that is
 /// nearest to `from`, on a periodic axis; `position` itself on another.
@@ -104,39 +124,20 @@ double nearest_target(const Dof& dof, double position, double from);
 /// included.
 void check_target(const std::string& device, const Dof& dof, double position);
 
-/// @throws std::out_of_range when `distance` is not a number, longer than the range of `dof`, or, for an axis
-/// that is not homed, longer than `longest_unhomed_jog`.
-void check_jog(const std::string& device, const Dof& dof, double distance, bool homed);
+/// @throws std::out_of_range when `distance` is not a number or longer than the range of `dof`.
+void check_jog(const std::string& device, const Dof& dof, double distance);
 
-/// The same failure with what became of the motor behind its cause.
-template <class Failure>
-[[noreturn]] void rethrow_with(const Failure& failure, const std::string& consequence) {
-  const std::string cause =
-      std::string(failure.what()).substr(failure.device().size() + failure.operation().size() + 4);
-  throw Failure(failure.device(), failure.operation(), cause + "; " + consequence);
-}
+/// For an axis that is not homed. @throws std::out_of_range when `distance` is longer than
+/// `longest_unhomed_jog`.
+void check_unhomed_jog(const std::string& device, const Dof& dof, double distance);
 
-/// Calls `work`; when it fails, calls `halt` (which says in words what became of the motor and does not
-/// throw) and throws the failure on with those words. A refusal after `stop` was requested is what the stop
-/// has brought about: Interrupted.
-template <class Work, class Halt>
-auto stopping_on_failure(const std::stop_token& stop, const Work& work, const Halt& halt) {
-  try {
-    return work();
-  } catch (const Interrupted&) {
-    halt();
-    throw;
-  } catch (const DeviceTimeout& failure) {
-    rethrow_with(failure, halt());
-  } catch (const DeviceLost& failure) {
-    rethrow_with(failure, halt());
-  } catch (const DeviceError& failure) {
-    const std::string consequence = halt();
-    if (stop.stop_requested())
-      throw Interrupted(failure.device() + ": " + failure.operation() + ": interrupted on request; " +
-                        consequence);
-    rethrow_with(failure, consequence);
-  }
-}
+/// Throws Interrupted naming the operation when `stop` was requested.
+void heed(const std::stop_token& stop, const std::string& device, const std::string& operation);
+
+/// What becomes of an alarm that the drive shows before a motion.
+enum class AlarmHandling {
+  refuse,  ///< an error, unless it only says that nobody has spoken to the drive
+  clear    ///< cleared where that can be done: homing is what an operator does after an alarm
+};
 
 }  // namespace eigenpose

@@ -228,7 +228,7 @@ ModbusAxis::Reading ModbusAxis::wait_for_standstill(const std::string& operation
   }
 }
 
-ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation, bool clear_any_alarm,
+ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation, AlarmHandling alarms,
                                                    TimePoint deadline, const std::stop_token& stop) {
   Reading reading = read(operation, deadline);
   if (bus_->connection_number() != set_up_connection_) {
@@ -236,11 +236,12 @@ ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation,
     reading = read(operation, deadline);
   }
   if (reading.moving) {
-    // Left over from an earlier life of this program, or someone else's hand.
+    // Left over from an earlier life of this program, or started by somebody else.
     send_stop(deadline);
     reading = wait_for_standstill(operation, deadline);
   }
-  if (reading.alarm && !profile_.clear_alarm.empty() && (reading.silence_alarm || clear_any_alarm)) {
+  const bool may_clear = reading.silence_alarm || alarms == AlarmHandling::clear;
+  if (reading.alarm && !profile_.clear_alarm.empty() && may_clear) {
     clear_alarm(operation, deadline);
     reading = read(operation, deadline);
   }
@@ -249,10 +250,17 @@ ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation,
                       fmt::format("alarm: {}; remove the cause, then home the axis", *reading.alarm));
 
   write(operation, profile_.prepare, {}, deadline);
+  return wait_until_ready(operation, deadline, stop);
+}
+
+ModbusAxis::Reading ModbusAxis::wait_until_ready(const std::string& operation, TimePoint deadline,
+                                                 const std::stop_token& stop) {
   const TimePoint patience = std::min(deadline, clock_.now() + options_.patience.start_time);
   bool set_up_again = false;
-  for (reading = read(operation, deadline); !reading.ready; reading = read(operation, deadline)) {
-    if (stop.stop_requested()) throw Interrupted();
+  for (;;) {
+    const Reading reading = read(operation, deadline);
+    if (reading.ready) return reading;
+    heed(stop, options_.name, operation);
     if (!set_up_again) {
       // A drive that was switched off and on behind its gateway has forgotten what it was told.
       set_up_after_connecting(operation, deadline);
@@ -263,53 +271,50 @@ ModbusAxis::Reading ModbusAxis::read_ready_to_move(const std::string& operation,
                         "the drive is not ready: is its power on and the motor enabled?");
     clock_.sleep_until(clock_.now() + options_.patience.poll_interval, stop);
   }
-  return reading;
 }
 
-ModbusAxis::Reading ModbusAxis::run(MotionWatch::Goal goal, const std::string& operation,
-                                    const RegisterWrites& command, const RegisterFill& fill,
-                                    TimePoint deadline, const std::stop_token& stop, Sending sending) {
-  const auto motion = [&] {
-    MotionWatch watch(options_.name, operation, options_.dof, goal, position_of(fill.position),
-                      info_.arrival_tolerance, options_.patience, clock_.now());
+MotionReading ModbusAxis::run(MotionOrder::Goal goal, const std::string& operation, const Command& command,
+                              TimePoint deadline, const std::stop_token& stop) {
+  const MotionOrder order{
+      options_.name,           operation,        options_.dof, goal, position_of(command.fill.position),
+      info_.arrival_tolerance, options_.patience};
+  MotionSteps steps;
+  steps.start = [&] {
     may_be_moving_ = true;
     arm_watchdog(operation, deadline);
-    if (stop.stop_requested())
-      throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
-    write(operation, command, fill, deadline, sending);
-    for (;;) {
-      if (stop.stop_requested())
-        throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
-      const Reading reading = read(operation, deadline);
-      const TimePoint now = clock_.now();
-      if (watch.arrived(reading, now, deadline)) {
-        may_be_moving_ = false;
-        disarm_watchdog(operation, deadline);
-        return reading;
-      }
-      clock_.sleep_until(std::min(deadline, now + options_.patience.poll_interval), stop);
-    }
+    heed(stop, options_.name, operation);
+    write(operation, command.writes, command.fill, deadline, command.sending);
   };
-  return stopping_on_failure(stop, motion, [this] { return stop_after_failure(); });
+  steps.read = [&] {
+    MotionReading reading = read(operation, deadline);
+    // Of a drive without a homed bit nothing but its standstill says that homing has ended.
+    if (goal == MotionOrder::Goal::home && !profile_.homed) reading.homed = true;
+    return reading;
+  };
+  steps.finish = [&] {
+    may_be_moving_ = false;
+    disarm_watchdog(operation, deadline);
+  };
+  steps.halt = [this] { return stop_after_failure(); };
+  return carry_out(order, steps, clock_, deadline, stop);
 }
 
 void ModbusAxis::home(TimePoint deadline, std::stop_token stop) {
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = "home";
   if (motion.token().stop_requested()) throw Interrupted();
-  read_ready_to_move(operation, true, deadline, motion.token());
+  read_ready_to_move(operation, AlarmHandling::clear, deadline, motion.token());
   RegisterFill fill = motion_fill();
   fill.position = steps_of(-options_.zero_offset);
-  const Reading reading =
-      run(MotionWatch::Goal::home, operation, profile_.home, fill, deadline, motion.token());
-  homed_here_ = true;
+  homed_here_ = false;
+  const MotionReading reading =
+      run(MotionOrder::Goal::home, operation, {profile_.home, fill}, deadline, motion.token());
   if (profile_.home_steps &&
-      std::abs(position_of(reading.steps) - position_of(*profile_.home_steps)) > info_.arrival_tolerance) {
-    homed_here_ = false;
-    throw DeviceError(
-        options_.name, operation,
-        fmt::format("homing ended at {} steps instead of {}", reading.steps, *profile_.home_steps));
-  }
+      std::abs(reading.position - position_of(*profile_.home_steps)) > info_.arrival_tolerance)
+    throw DeviceError(options_.name, operation,
+                      fmt::format("homing ended at {} steps instead of {}", steps_of(reading.position),
+                                  *profile_.home_steps));
+  homed_here_ = true;
 }
 
 double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token stop) {
@@ -318,7 +323,7 @@ double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token 
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = fmt::format("move to {} {}", position, dof.unit);
   if (motion.token().stop_requested()) throw Interrupted();
-  const Reading before = read_ready_to_move(operation, false, deadline, motion.token());
+  const Reading before = read_ready_to_move(operation, AlarmHandling::refuse, deadline, motion.token());
   if (!before.homed) throw DeviceError(options_.name, operation, "not homed; home the axis first");
 
   RegisterFill fill = motion_fill();
@@ -328,27 +333,29 @@ double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token 
     // The counter is at its end: the long way, once in a lifetime.
     fill.position = steps_of(dof.canonical(position));
   }
-  const Reading after =
-      run(MotionWatch::Goal::target, operation, profile_.move, fill, deadline, motion.token());
-  return options_.dof.canonical(after.position);
+  const MotionReading after =
+      run(MotionOrder::Goal::target, operation, {profile_.move, fill}, deadline, motion.token());
+  return dof.canonical(after.position);
 }
 
 double ModbusAxis::jog(double distance, TimePoint deadline, std::stop_token stop) {
   if (profile_.jog.empty()) return Axis::jog(distance, deadline, std::move(stop));
   const Dof& dof = options_.dof;
-  check_jog(options_.name, dof, distance, true);
+  check_jog(options_.name, dof, distance);
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = fmt::format("jog by {} {}", distance, dof.unit);
   if (motion.token().stop_requested()) throw Interrupted();
-  const Reading before = read_ready_to_move(operation, false, deadline, motion.token());
-  check_jog(options_.name, dof, distance, before.homed);
-  if (before.homed && !dof.periodic) check_target(options_.name, dof, before.position + distance);
+  const Reading before = read_ready_to_move(operation, AlarmHandling::refuse, deadline, motion.token());
+  if (!before.homed)
+    check_unhomed_jog(options_.name, dof, distance);
+  else if (!dof.periodic)
+    check_target(options_.name, dof, before.position + distance);
 
   RegisterFill fill = motion_fill();
   fill.distance = std::llround((options_.reversed ? -distance : distance) * options_.steps_per_unit);
   fill.position = before.steps + fill.distance;
-  const Reading after =
-      run(MotionWatch::Goal::target, operation, profile_.jog, fill, deadline, motion.token(), Sending::once);
+  const MotionReading after = run(MotionOrder::Goal::target, operation, {profile_.jog, fill, Sending::once},
+                                  deadline, motion.token());
   return dof.canonical(after.position);
 }
 

@@ -37,11 +37,10 @@ struct ModbusAxisOptions {
 /// Lives on one thread, except `stop_motion`. Several axes may share one bus. The destructor stops a motion
 /// that may be under way.
 ///
-/// A move is refused on an axis that is not homed or has an alarm; only alarms that say that nobody spoke to
-/// the drive
-/// (`ModbusProfile::silence_alarms`) are cleared silently. `home` clears any alarm that can be cleared,
-/// because it is what an operator does after one. When a motion fails, the text of the error says whether the
-/// drive could be stopped.
+/// A move is refused on an axis that is not homed or has an alarm. Only alarms that say that nobody spoke to
+/// the drive (`ModbusProfile::silence_alarms`) are cleared silently. `home` clears every alarm that can be
+/// cleared, because it is what an operator does after one. When a motion fails, the text of the error says
+/// whether the drive could be stopped.
 class ModbusAxis final : public Axis {
  public:
   /// Does not touch the device. @param clock must outlive the axis.
@@ -75,17 +74,23 @@ class ModbusAxis final : public Axis {
   };
 
   Reading read(const std::string& operation, TimePoint deadline);
-  Reading read_ready_to_move(const std::string& operation, bool clear_any_alarm, TimePoint deadline,
+  Reading read_ready_to_move(const std::string& operation, AlarmHandling alarms, TimePoint deadline,
                              const std::stop_token& stop);
+  Reading wait_until_ready(const std::string& operation, TimePoint deadline, const std::stop_token& stop);
   void write(const std::string& operation, const RegisterWrites& writes, const RegisterFill& fill,
              TimePoint deadline, Sending sending = Sending::until_answered);
   void clear_alarm(const std::string& operation, TimePoint deadline);
   void set_up_after_connecting(const std::string& operation, TimePoint deadline);
   Reading wait_for_standstill(const std::string& operation, TimePoint deadline);
+  /// What starts a motion.
+  struct Command {
+    const RegisterWrites& writes;
+    RegisterFill fill;  ///< `position` is where it ends
+    Sending sending = Sending::until_answered;
+  };
   /// Sends `command` and waits. On every way but arrival the drive has been told to stop.
-  Reading run(MotionWatch::Goal goal, const std::string& operation, const RegisterWrites& command,
-              const RegisterFill& fill, TimePoint deadline, const std::stop_token& stop,
-              Sending sending = Sending::until_answered);
+  MotionReading run(MotionOrder::Goal goal, const std::string& operation, const Command& command,
+                    TimePoint deadline, const std::stop_token& stop);
   /// Tries to stop after a failure; never throws. Says in words how it went.
   std::string stop_after_failure();
   void send_stop(TimePoint deadline);

@@ -146,7 +146,8 @@ apt::Received AptAxis::wait_for(Message number, const std::string& operation, Ti
     // Messages have no checksum. If bytes of one were lost, those of the next fill its place, and what is
     // left over is no message: so an answer counts only when the stream stands between two messages.
     if (answer && unpacker_.between_messages()) return std::move(*answer);
-    const std::size_t count = link_->read(buffer, patience);
+    // Bytes that keep coming are no answer either.
+    const std::size_t count = clock_.now() < patience ? link_->read(buffer, patience) : 0;
     if (count == 0) throw DeviceTimeout(options_.name, operation, "no answer");
     unpacker_.feed(std::span(buffer).first(count));
   }
@@ -242,10 +243,10 @@ std::string AptAxis::stop_after_failure() {
   }
 }
 
-MotionReading AptAxis::read_at_rest(const std::string& operation, bool forget_faults, TimePoint deadline) {
+MotionReading AptAxis::read_at_rest(const std::string& operation, AlarmHandling alarms, TimePoint deadline) {
   MotionReading reading = read(operation, deadline);
   if (reading.moving) {
-    // Left over from an earlier life of this program, or someone's hand on the buttons.
+    // Left over from an earlier life of this program, or started by the controller's own buttons.
     send_stop(deadline);
     const TimePoint patience = std::min(deadline, clock_.now() + standstill_patience);
     while ((reading = read(operation, deadline)).moving) {
@@ -254,20 +255,8 @@ MotionReading AptAxis::read_at_rest(const std::string& operation, bool forget_fa
       clock_.sleep_for(options_.patience.poll_interval);
     }
   }
-  if (reading.alarm && forget_faults) {
-    {
-      const std::lock_guard lock(link_mutex_);
-      // The controller forgets a motion error when the channel is switched off and on.
-      with_retries(operation, deadline, [&] {
-        transmit(apt::short_message(Message::set_channel_enabled, options_.channel, channel_off,
-                                    options_.controller),
-                 deadline);
-        transmit(apt::short_message(Message::set_channel_enabled, options_.channel, channel_on,
-                                    options_.controller),
-                 deadline);
-      });
-      fault_.reset();
-    }
+  if (reading.alarm && alarms == AlarmHandling::clear) {
+    forget_faults(operation, deadline);
     reading = read(operation, deadline);
   }
   if (reading.alarm)
@@ -276,40 +265,41 @@ MotionReading AptAxis::read_at_rest(const std::string& operation, bool forget_fa
   return reading;
 }
 
-MotionReading AptAxis::run(MotionWatch::Goal goal, const std::string& operation,
-                           std::span<const std::uint8_t> command, double target, TimePoint deadline,
-                           const std::stop_token& stop) {
-  const auto motion = [&] {
-    MotionWatch watch(options_.name, operation, options_.dof, goal, target, info_.arrival_tolerance,
-                      options_.patience, clock_.now());
-    const auto heed = [&] {
-      if (stop.stop_requested())
-        throw Interrupted(options_.name + ": " + operation + ": interrupted on request");
-    };
-    heed();
+void AptAxis::forget_faults(const std::string& operation, TimePoint deadline) {
+  const std::lock_guard lock(link_mutex_);
+  // The controller forgets a motion error when the channel is switched off and on.
+  with_retries(operation, deadline, [&] {
+    for (const std::uint8_t state : {channel_off, channel_on})
+      transmit(apt::short_message(Message::set_channel_enabled, options_.channel, state, options_.controller),
+               deadline);
+  });
+  fault_.reset();
+}
+
+MotionOrder AptAxis::order(MotionOrder::Goal goal, const std::string& operation, double target) const {
+  return {options_.name, operation, options_.dof, goal, target, info_.arrival_tolerance, options_.patience};
+}
+
+MotionReading AptAxis::run(const MotionOrder& order, std::span<const std::uint8_t> command,
+                           TimePoint deadline, const std::stop_token& stop) {
+  MotionSteps steps;
+  steps.start = [&] {
     may_be_moving_ = true;
-    send(operation, command, deadline);
-    for (;;) {
-      heed();
-      const MotionReading reading = read(operation, deadline);
-      const TimePoint now = clock_.now();
-      if (watch.arrived(reading, now, deadline)) {
-        may_be_moving_ = false;
-        return reading;
-      }
-      clock_.sleep_until(std::min(deadline, now + options_.patience.poll_interval), stop);
-    }
+    send(order.operation, command, deadline);
   };
-  return stopping_on_failure(stop, motion, [this] { return stop_after_failure(); });
+  steps.read = [&] { return read(order.operation, deadline); };
+  steps.finish = [this] { may_be_moving_ = false; };
+  steps.halt = [this] { return stop_after_failure(); };
+  return carry_out(order, steps, clock_, deadline, stop);
 }
 
 void AptAxis::home(TimePoint deadline, std::stop_token stop) {
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = "home";
   if (motion.token().stop_requested()) throw Interrupted();
-  (void)read_at_rest(operation, true, deadline);
-  run(MotionWatch::Goal::home, operation,
-      apt::short_message(Message::move_home, options_.channel, 0, options_.controller), 0.0, deadline,
+  (void)read_at_rest(operation, AlarmHandling::clear, deadline);
+  run(order(MotionOrder::Goal::home, operation, 0.0),
+      apt::short_message(Message::move_home, options_.channel, 0, options_.controller), deadline,
       motion.token());
 }
 
@@ -318,12 +308,12 @@ double AptAxis::move_to(double position, TimePoint deadline, std::stop_token sto
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = fmt::format("move to {} {}", position, options_.dof.unit);
   if (motion.token().stop_requested()) throw Interrupted();
-  const MotionReading before = read_at_rest(operation, false, deadline);
+  const MotionReading before = read_at_rest(operation, AlarmHandling::refuse, deadline);
   if (!before.homed) throw DeviceError(options_.name, operation, "not homed; home the axis first");
   const std::int32_t counts = counts_of(operation, nearest_target(options_.dof, position, before.position));
-  const MotionReading after = run(MotionWatch::Goal::target, operation,
-                                  apt::move_absolute(options_.channel, counts, options_.controller),
-                                  position_of(counts), deadline, motion.token());
+  const MotionReading after =
+      run(order(MotionOrder::Goal::target, operation, position_of(counts)),
+          apt::move_absolute(options_.channel, counts, options_.controller), deadline, motion.token());
   return options_.dof.canonical(after.position);
 }
 

@@ -55,10 +55,12 @@ class AptAxis final : public Axis {
   MotionReading read(const std::string& operation, TimePoint deadline);
   /// Sends and, on failure, opens the link anew and sends again, `attempts` times in all.
   void send(const std::string& operation, std::span<const std::uint8_t> message, TimePoint deadline);
-  MotionReading run(MotionWatch::Goal goal, const std::string& operation,
-                    std::span<const std::uint8_t> command, double target, TimePoint deadline,
+  MotionOrder order(MotionOrder::Goal goal, const std::string& operation, double target) const;
+  /// Sends `command` and waits. On every way but arrival the controller has been told to stop.
+  MotionReading run(const MotionOrder& order, std::span<const std::uint8_t> command, TimePoint deadline,
                     const std::stop_token& stop);
-  MotionReading read_at_rest(const std::string& operation, bool forget_faults, TimePoint deadline);
+  MotionReading read_at_rest(const std::string& operation, AlarmHandling alarms, TimePoint deadline);
+  void forget_faults(const std::string& operation, TimePoint deadline);
   void send_stop(TimePoint deadline);
   std::string stop_after_failure();
 

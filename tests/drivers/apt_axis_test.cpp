@@ -4,6 +4,7 @@
 #include "drivers/usb/apt_axis.h"
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <thread>
 
@@ -15,6 +16,7 @@
 #include "sim/usb/apt_controller.h"
 #include "sim/usb/sim_link.h"
 #include "tests/drivers/axis_conformance.h"
+#include "tests/drivers/scripted_link.h"
 
 namespace eigenpose {
 namespace {
@@ -143,6 +145,185 @@ TEST_F(AptAxisTest, ALostDeviceIsNamed) {
     EXPECT_THAT(error.what(), HasSubstr("unplugged"));
     EXPECT_EQ(error.device(), "arm");
   }
+}
+
+/// The same arm with other options.
+class AptOptionsRig {
+ public:
+  explicit AptOptionsRig(const std::function<void(AptAxisOptions&)>& change = {}) {
+    AptAxisOptions options;
+    options.stage = apt_stage("PRM1-Z8");
+    options.speed = 30.0;
+    options.acceleration = 60.0;
+    options.patience = {.poll_interval = 3ms, .start_time = 80ms, .settle_time = 80ms, .stall_time = 300ms};
+    if (change) change(options);
+    axis_ = std::make_unique<AptAxis>(options, std::make_unique<sim::SimLink>(cable_, clock_), clock_);
+  }
+  AptAxis& axis() { return *axis_; }
+  sim::AptController& controller() { return controller_; }
+  double true_position() { return lab_.axis_position_deg(sim::LabAxis::arm_azimuth, clock_.now()); }
+
+ private:
+  SteadyClock clock_;
+  sim::SimLab lab_{clock_};
+  sim::AptController controller_{lab_, {.speed_factor = 30.0}};
+  sim::Cable cable_{controller_, clock_};
+  std::unique_ptr<AptAxis> axis_;
+};
+
+TEST(AptAxisOptionsAtWork, AReversedAxisMovesAndReadsTheOtherWay) {
+  AptOptionsRig rig([](AptAxisOptions& o) {
+    o.reversed = true;
+    o.zero_offset = 10.0;
+  });
+  rig.axis().home(soon(), {});
+  EXPECT_NEAR(rig.axis().state(soon()).position, 350.0, 0.05) << "home lies 10 before the axis's zero";
+  EXPECT_NEAR(rig.axis().move_to(30.0, soon(), {}), 30.0, 0.05);
+  EXPECT_NEAR(rig.true_position(), -40.0, 0.05) << "30 + 10 the other way";
+  EXPECT_NEAR(rig.axis().state(soon()).position, 30.0, 0.05);
+}
+
+TEST(AptAxisOptionsAtWork, ALinearRangeIsNotLeftByAJog) {
+  AptOptionsRig rig([](AptAxisOptions& o) { o.dof = {"arm", "deg", -20.0, 40.0, false}; });
+  rig.axis().home(soon(), {});
+  EXPECT_NEAR(rig.axis().jog(35.0, soon(), {}), 35.0, 0.05);
+  EXPECT_THROW(rig.axis().jog(6.0, soon(), {}), std::out_of_range);
+  EXPECT_NEAR(rig.true_position(), 35.0, 0.05);
+  EXPECT_NEAR(rig.axis().jog(5.0, soon(), {}), 40.0, 0.05) << "up to the end";
+}
+
+TEST(AptAxisOptionsAtWork, AMotionErrorIsAnAlarmWithoutTheControllersWords) {
+  AptOptionsRig rig;
+  rig.axis().home(soon(), {});
+  rig.controller().set_faults({.stuck = true});
+  EXPECT_THROW(rig.axis().move_to(20.0, soon(), {}), DeviceError);
+  const AxisState state = rig.axis().state(soon());
+  ASSERT_TRUE(state.alarm.has_value());
+  EXPECT_THAT(*state.alarm, HasSubstr("blocked or overloaded"));
+  EXPECT_THAT([&] { rig.axis().move_to(0.0, soon(), {}); },
+              testing::ThrowsMessage<DeviceError>(HasSubstr("blocked or overloaded")));
+  rig.controller().set_faults({});
+  rig.axis().home(soon(), {});
+  EXPECT_FALSE(rig.axis().state(soon()).alarm.has_value());
+}
+
+TEST(AptAxisOptionsAtWork, ImpossibleOnesAreRefusedBeforeAnythingIsOpened) {
+  const auto refused = [](const std::function<void(AptAxisOptions&)>& spoil) {
+    EXPECT_THROW(AptOptionsRig rig(spoil), std::invalid_argument);
+  };
+  refused([](AptAxisOptions& o) { o.name.clear(); });
+  refused([](AptAxisOptions& o) { o.dof.upper = o.dof.lower; });
+  refused([](AptAxisOptions& o) { o.stage.counts_per_unit = 0.0; });
+  refused([](AptAxisOptions& o) { o.dof.unit = "mm"; });
+  refused([](AptAxisOptions& o) { o.channel = 0; });
+  refused([](AptAxisOptions& o) { o.speed = -1.0; });
+  refused([](AptAxisOptions& o) { o.acceleration = -1.0; });
+  refused([](AptAxisOptions& o) { o.arrival_tolerance = -1.0; });
+  refused([](AptAxisOptions& o) { o.attempts = 0; });
+  refused([](AptAxisOptions& o) { o.attempts = 11; });
+}
+
+/// An axis whose controller is the test itself.
+struct ScriptedAxis {
+  explicit ScriptedAxis(int attempts) {
+    auto link = std::make_unique<test::ScriptedLink>(clock);
+    far_end = link.get();
+    far_end->on_write = [this](std::span<const std::uint8_t> bytes) { hear(bytes); };
+    AptAxisOptions options;
+    options.stage = apt_stage("PRM1-Z8");
+    options.response_timeout = 10ms;
+    options.attempts = attempts;
+    axis = std::make_unique<AptAxis>(options, std::move(link), clock);
+  }
+  void hear(std::span<const std::uint8_t> bytes) {
+    const int number = bytes[0] | bytes[1] << 8;
+    if (number == 0x0005) ++set_ups;
+    if (number == 0x0465) ++stops;
+    if (!answers) return;
+    if (number == 0x0005) answer(0x06, std::vector<std::uint8_t>(84, 0));
+    if (number == 0x0490) {
+      std::vector<std::uint8_t> status(14, 0);
+      status[0] = 1;
+      for (int i = 0; i < 4; ++i)
+        status[static_cast<std::size_t>(10 + i)] = static_cast<std::uint8_t>(bits >> 8 * i);
+      answer(0x91, status);
+    }
+  }
+  void answer(std::uint8_t low, const std::vector<std::uint8_t>& data) const {
+    far_end->say(std::vector<std::uint8_t>{low, static_cast<std::uint8_t>(low == 0x06 ? 0x00 : 0x04),
+                                           static_cast<std::uint8_t>(data.size()), 0, 0x81, 0x50});
+    far_end->say(data);
+  }
+
+  SteadyClock clock;
+  test::ScriptedLink* far_end = nullptr;
+  bool answers = true;
+  std::uint32_t bits = 0x80000400;  // enabled, homed
+  int set_ups = 0;
+  int stops = 0;
+  std::unique_ptr<AptAxis> axis;
+};
+
+TEST(AptAxisOnAScript, AsksAsOftenAsItMayAndNotOnceMore) {
+  for (const int attempts : {1, 3}) {
+    ScriptedAxis arm(attempts);
+    arm.answers = false;
+    EXPECT_THROW(arm.axis->state(soon()), DeviceTimeout);
+    EXPECT_EQ(arm.set_ups, attempts);
+    EXPECT_EQ(arm.far_end->reopenings, attempts - 1);
+  }
+}
+
+TEST(AptAxisOnAScript, EachStatusBitHasItsMeaning) {
+  ScriptedAxis arm(1);
+  const auto state = [&](std::uint32_t bits) {
+    arm.bits = bits;
+    return arm.axis->state(soon());
+  };
+  EXPECT_TRUE(state(0x80000400).homed);
+  EXPECT_FALSE(state(0x80000000).homed);
+  for (const std::uint32_t moving : {0x10U, 0x20U, 0x40U, 0x80U, 0x200U})
+    EXPECT_TRUE(state(0x80000400 | moving).moving) << moving;
+  for (const std::uint32_t resting : {0x1U, 0x2U, 0x100U, 0x400U})
+    EXPECT_FALSE(state(0x80000000 | resting).moving) << resting;
+  EXPECT_FALSE(state(0x80000400).alarm.has_value());
+  for (const std::uint32_t fault : {0x4000U, 0x01000000U}) {
+    ScriptedAxis broken(1);
+    broken.bits |= fault;
+    EXPECT_THAT(broken.axis->state(soon()).alarm.value_or(""), HasSubstr("blocked or overloaded")) << fault;
+  }
+}
+
+TEST(AptAxisOnAScript, BytesWithoutEndAreNoAnswer) {
+  for (const std::vector<std::uint8_t>& bytes :
+       {std::vector<std::uint8_t>{0x44, 0x04, 1, 0, 0x01, 0x50},  // "homed", again and again
+        std::vector<std::uint8_t>(64, 0x01), std::vector<std::uint8_t>(64, 0xFF)}) {
+    ScriptedAxis arm(2);
+    arm.answers = false;
+    arm.far_end->flood = bytes;
+    EXPECT_THROW(arm.axis->state(soon()), DeviceError);
+    EXPECT_THROW(arm.axis->move_to(20.0, soon(), {}), DeviceError);
+    EXPECT_THROW(arm.axis->stop_motion(), DeviceError);
+  }
+}
+
+TEST(AptAxisOnAScript, OnlyAnAxisThatMayStillMoveIsStoppedWhenItIsDestroyed) {
+  ScriptedAxis resting(1);
+  (void)resting.axis->state(soon());
+  resting.axis.reset();
+  EXPECT_EQ(resting.stops, 0);
+
+  ScriptedAxis unheard(1);
+  (void)unheard.axis->state(soon());
+  unheard.far_end->on_write = [&](std::span<const std::uint8_t> bytes) {
+    if (bytes[0] == 0x53) unheard.answers = false;  // the move goes out, and nothing is heard any more
+    unheard.hear(bytes);
+  };
+  EXPECT_THROW(unheard.axis->move_to(20.0, soon(), {}), DeviceError);
+  const int stops = unheard.stops;
+  EXPECT_GE(stops, 1) << "told as soon as it failed";
+  unheard.axis.reset();
+  EXPECT_GT(unheard.stops, stops) << "and once more, because nobody knows";
 }
 
 TEST(AptStage, EveryStageHasItsFigures) {

@@ -106,6 +106,82 @@ TEST_F(ModbusAxisTest, SaysTheAlarmThatTheDriveRaised) {
   EXPECT_THAT(failure_of([&] { rig_.axis().move_to(30.0, soon(), {}); }), HasSubstr("limit switch reached"));
 }
 
+TEST_F(ModbusAxisTest, AnAlarmDuringAMotionEndsItInWords) {
+  rig_.axis().home(soon(), {});
+  rig_.slow_down(true);
+  std::string text;
+  std::jthread mover([&] { text = failure_of([&] { rig_.axis().move_to(170.0, soon(), {}); }); });
+  while (!rig_.truly_moving()) std::this_thread::yield();
+  rig_.drive().raise_alarm(0x30);
+  mover.join();
+  EXPECT_THAT(text, testing::AllOf(HasSubstr("alarm: overload"), HasSubstr("told to stop")));
+}
+
+TEST_F(ModbusAxisTest, HomingThatEndsElsewhereThanHomeIsAFailure) {
+  SteadyClock clock;
+  ModbusProfile profile = oriental_motor_az_profile();
+  for (const int off : {100, -100, 6}) {
+    profile.home_steps = off;
+    ModbusAxis axis(profile, rig_.options(), rig_.bus(), clock);
+    EXPECT_THAT(failure_of([&] { axis.home(soon(), {}); }),
+                HasSubstr("homing ended at 0 steps instead of " + std::to_string(off)));
+  }
+  profile.home_steps = 4;  // within the tolerance of 0.05 deg
+  ModbusAxis axis(profile, rig_.options(), rig_.bus(), clock);
+  EXPECT_NO_THROW(axis.home(soon(), {}));
+}
+
+TEST_F(ModbusAxisTest, ADriveWithoutAHomedBitIsHomedOnlyByItsOwnDriver) {
+  SteadyClock clock;
+  ModbusProfile profile = oriental_motor_az_profile();
+  profile.homed.reset();
+  ModbusAxis axis(profile, rig_.options(), rig_.bus(), clock);
+  EXPECT_FALSE(axis.state(soon()).homed);
+  EXPECT_THAT(failure_of([&] { axis.move_to(30.0, soon(), {}); }), HasSubstr("not homed"));
+  axis.home(soon(), {});
+  EXPECT_TRUE(axis.state(soon()).homed);
+  EXPECT_NEAR(axis.move_to(30.0, soon(), {}), 30.0, 0.05);
+  profile.home_steps = 100;
+  ModbusAxis elsewhere(profile, rig_.options(), rig_.bus(), clock);
+  EXPECT_THROW(elsewhere.home(soon(), {}), DeviceError);
+  EXPECT_FALSE(elsewhere.state(soon()).homed) << "it ended elsewhere";
+}
+
+TEST_F(ModbusAxisTest, ALinearAxisKeepsItsEndsAndTakesNoShortCut) {
+  SteadyClock clock;
+  ModbusAxisOptions options = rig_.options();
+  options.dof = {"slide", "mm", -20.0, 340.0, false};
+  ModbusAxis axis(oriental_motor_az_profile(), options, rig_.bus(), clock);
+  axis.home(soon(), {});
+  EXPECT_NEAR(axis.move_to(340.0, soon(), {}), 340.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), 340.0, 0.05);
+  EXPECT_THROW(axis.jog(0.5, soon(), {}), std::out_of_range);
+  EXPECT_NEAR(axis.jog(-30.0, soon(), {}), 310.0, 0.05);
+  EXPECT_NEAR(axis.jog(30.0, soon(), {}), 340.0, 0.06) << "up to the end";
+  EXPECT_NEAR(axis.move_to(-20.0, soon(), {}), -20.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), -20.0, 0.05) << "all the way back";
+}
+
+TEST_F(ModbusAxisTest, AReversedAxisIsJoggedAndReadTheOtherWay) {
+  SteadyClock clock;
+  ModbusAxisOptions options = rig_.options();
+  options.reversed = true;
+  ModbusAxis axis(oriental_motor_az_profile(), options, rig_.bus(), clock);
+  axis.home(soon(), {});
+  EXPECT_NEAR(axis.jog(15.0, soon(), {}), 15.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), -15.0, 0.05);
+  EXPECT_NEAR(axis.state(soon()).position, 15.0, 0.05);
+}
+
+TEST_F(ModbusAxisTest, AMotorLeftMovingIsStoppedBeforeItIsMoved) {
+  rig_.axis().home(soon(), {});
+  rig_.turn_steadily(3.0);
+  while (!rig_.truly_moving()) std::this_thread::yield();
+  EXPECT_TRUE(rig_.axis().state(soon()).moving);
+  EXPECT_NEAR(rig_.axis().move_to(30.0, soon(), {}), 30.0, 0.05);
+  EXPECT_NEAR(rig_.true_position(), 30.0, 0.05);
+}
+
 TEST_F(ModbusAxisTest, ReversedAxesAndOffsetsAreHeeded) {
   ModbusAxisOptions options = rig_.options();
   options.reversed = true;
