@@ -12,6 +12,7 @@
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/socket.h>
+#include <termios.h>
 #include <unistd.h>
 
 namespace eigenpose {
@@ -23,6 +24,9 @@ constexpr std::uint8_t write_single_register = 0x06;
 constexpr std::uint8_t write_multiple_registers = 0x10;
 constexpr std::uint8_t exception_flag = 0x80;
 constexpr int mbap_length = 7;  ///< transaction, protocol, length, unit
+/// More than late answers ever are. What still comes in then comes without end, and is left to the checks of
+/// the answer.
+constexpr std::size_t most_stale_bytes = 16 * MODBUS_TCP_MAX_ADU_LENGTH;
 
 std::uint8_t high(int value) {
   return static_cast<std::uint8_t>(value >> 8);
@@ -91,13 +95,6 @@ std::string connect_advice(int error, bool serial) {
   return text;
 }
 
-modbus_t* new_context(const ModbusBusOptions& options) {
-  if (const auto* tcp = std::get_if<ModbusTcpEndpoint>(&options.endpoint))
-    return modbus_new_tcp_pi(tcp->host.c_str(), std::to_string(tcp->port).c_str());
-  const auto& rtu = std::get<ModbusRtuEndpoint>(options.endpoint);
-  return modbus_new_rtu(rtu.device.c_str(), rtu.baud, rtu.parity, 8, rtu.stop_bits);
-}
-
 Duration silent_interval_of(const ModbusRtuEndpoint& rtu) {
   // 3.5 characters of 11 bits; above 19200 baud the protocol fixes 1.75 ms (Modbus over serial
   // line, 2.5.1.1).
@@ -108,26 +105,33 @@ Duration silent_interval_of(const ModbusRtuEndpoint& rtu) {
 
 }  // namespace
 
-ModbusBus::Connection::Connection(const ModbusBusOptions& options, Duration timeout)
-    : context_(new_context(options)), serial_(std::holds_alternative<ModbusRtuEndpoint>(options.endpoint)) {
+ModbusBus::Connection::Connection(const std::string& address, int port, Duration timeout)
+    : context_(modbus_new_tcp_pi(address.c_str(), std::to_string(port).c_str())) {
+  connect(timeout);
+}
+
+ModbusBus::Connection::Connection(const ModbusRtuEndpoint& line, Duration timeout)
+    : context_(modbus_new_rtu(line.device.c_str(), line.baud, line.parity, 8, line.stop_bits)),
+      serial_(true),
+      silent_interval_(silent_interval_of(line)) {
+  connect(timeout);
+  // Two masters on one line would also read each other's answers. The lock goes with the open port: a port
+  // that was unplugged is nobody's.
+  if (flock(modbus_get_socket(context_), LOCK_EX | LOCK_NB) != 0) {
+    modbus_close(context_);
+    modbus_free(context_);
+    throw ModbusFailure{ModbusFault::held, std::string(held_by_another)};
+  }
+}
+
+void ModbusBus::Connection::connect(Duration timeout) {
   if (context_ == nullptr) throw ModbusFailure{ModbusFault::no_connection, modbus_strerror(errno)};
   modbus_set_error_recovery(context_, MODBUS_ERROR_RECOVERY_NONE);
   set_timeout(context_, timeout);
-  if (modbus_connect(context_) < 0) {
-    const int error = errno;
-    modbus_free(context_);
-    throw ModbusFailure{ModbusFault::no_connection, connect_advice(error, serial_)};
-  }
-  if (serial_) {
-    silent_interval_ = silent_interval_of(std::get<ModbusRtuEndpoint>(options.endpoint));
-    // Two masters on one line would also read each other's answers. The lock goes with the open port: a port
-    // that was unplugged is nobody's.
-    if (flock(modbus_get_socket(context_), LOCK_EX | LOCK_NB) != 0) {
-      modbus_close(context_);
-      modbus_free(context_);
-      throw ModbusFailure{ModbusFault::held, std::string(held_by_another)};
-    }
-  }
+  if (modbus_connect(context_) == 0) return;
+  const int error = errno;
+  modbus_free(context_);
+  throw ModbusFailure{ModbusFault::no_connection, connect_advice(error, serial_)};
 }
 
 ModbusBus::Connection::~Connection() {
@@ -186,47 +190,102 @@ void ModbusBus::Connection::send_tcp(int unit, std::span<const std::uint8_t> req
     throw ModbusFailure{ModbusFault::no_connection, "the connection takes no more data"};
 }
 
-void ModbusBus::Connection::send_serial(int unit, std::span<const std::uint8_t> request) {
+void ModbusBus::Connection::discard_stale_input() {
+  if (serial_) {
+    tcflush(modbus_get_socket(context_), TCIFLUSH);
+    return;
+  }
+  std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH> stale{};
+  for (std::size_t discarded = 0; discarded < most_stale_bytes;) {
+    const ssize_t got = recv(modbus_get_socket(context_), stale.data(), stale.size(), MSG_DONTWAIT);
+    if (got <= 0) return;
+    discarded += static_cast<std::size_t>(got);
+  }
+}
+
+void ModbusBus::Connection::receive_serial(rtu::Answer& answer,
+                                           std::chrono::steady_clock::time_point deadline) {
+  std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> buffer{};
+  while (answer.missing() > 0) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    pollfd line{modbus_get_socket(context_), POLLIN, 0};
+    const int ready = left.count() > 0 ? poll(&line, 1, static_cast<int>(left.count())) : 0;
+    if (ready == 0) fail_with_errno(ETIMEDOUT);
+    const ssize_t got =
+        ready < 0 ? -1 : ::read(line.fd, buffer.data(), std::min(answer.missing(), buffer.size()));
+    if (got == 0) fail_with_errno(ECONNRESET);
+    if (got < 0 && errno != EAGAIN && errno != EINTR) fail_with_errno(errno);
+    if (got > 0) answer.feed(std::span(buffer).first(static_cast<std::size_t>(got)));
+  }
+}
+
+// Whether the adapter echoes cannot be seen in the answer to function 06, which equals its request. A read
+// tells, whatever the device says to it.
+void ModbusBus::Connection::learn_echo(int unit, std::span<const std::uint8_t> request, Duration timeout) {
+  const std::array<std::uint8_t, 5> probe = {read_holding_registers, request[1], request[2], 0, 1};
+  try {
+    (void)exchange(unit, probe, timeout);
+  } catch (const ModbusFailure& failure) {
+    if (failure.fault != ModbusFault::refused) throw;
+  }
+}
+
+std::span<const std::uint8_t> ModbusBus::Connection::exchange_serial(int unit,
+                                                                     std::span<const std::uint8_t> request,
+                                                                     Duration timeout) {
+  if (echo_ == rtu::Echo::unknown && request[0] == write_single_register) learn_echo(unit, request, timeout);
   wait_for_silent_interval();
+  std::vector<std::uint8_t> raw = {low(unit)};
+  raw.insert(raw.end(), request.begin(), request.end());
   modbus_set_slave(context_, unit);
-  std::array<std::uint8_t, MODBUS_MAX_PDU_LENGTH + 1> raw{};
-  raw[0] = low(unit);
-  std::copy(request.begin(), request.end(), raw.begin() + 1);
-  if (modbus_send_raw_request(context_, raw.data(), static_cast<int>(request.size()) + 1) < 0)
-    fail_with_errno(errno);
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  if (modbus_send_raw_request(context_, raw.data(), static_cast<int>(raw.size())) < 0) fail_with_errno(errno);
+
+  rtu::Answer answer(rtu::with_checksum(raw), echo_);
+  try {
+    receive_serial(answer, deadline);
+  } catch (const ModbusFailure&) {
+    last_frame_ = std::chrono::steady_clock::now();
+    throw;
+  }
+  last_frame_ = std::chrono::steady_clock::now();
+  if (answer.echo_is_damaged())
+    throw ModbusFailure{ModbusFault::damaged,
+                        "the adapter hears other bytes than it sends; does something else send on the line?"};
+  echo_ = answer.echo();
+  answer_.assign(answer.bytes().begin(), answer.bytes().end());
+  if (!rtu::is_sound(answer_)) fail_with_errno(EMBBADCRC);
+  if (answer_[0] != low(unit)) throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
+  return std::span<const std::uint8_t>(answer_).subspan(1, answer_.size() - 3);
+}
+
+std::span<const std::uint8_t> ModbusBus::Connection::exchange_tcp(int unit,
+                                                                  std::span<const std::uint8_t> request,
+                                                                  Duration timeout) {
+  set_timeout(context_, timeout);
+  send_tcp(unit, request);
+  answer_.resize(MODBUS_MAX_ADU_LENGTH);
+  const int length = modbus_receive_confirmation(context_, answer_.data());
+  if (length < 0) fail_with_errno(errno);
+  if (length < mbap_length + 2) throw ModbusFailure{ModbusFault::damaged, "answer too short"};
+  answer_.resize(static_cast<std::size_t>(length));
+  if (answer_[0] != high(transaction_) || answer_[1] != low(transaction_))
+    throw ModbusFailure{ModbusFault::damaged, "answer to another request"};
+  if (answer_[2] != 0 || answer_[3] != 0)
+    throw ModbusFailure{ModbusFault::damaged, "answer that is not Modbus"};
+  if (answer_[4] * 256 + answer_[5] != length - (mbap_length - 1))
+    throw ModbusFailure{ModbusFault::damaged, "answer with a wrong length"};
+  if (answer_[mbap_length - 1] != low(unit))
+    throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
+  return std::span<const std::uint8_t>(answer_).subspan(mbap_length);
 }
 
 std::span<const std::uint8_t> ModbusBus::Connection::exchange(int unit, std::span<const std::uint8_t> request,
                                                               Duration timeout) {
-  modbus_flush(context_);
-  set_timeout(context_, timeout);
-  if (serial_)
-    send_serial(unit, request);
-  else
-    send_tcp(unit, request);
-
-  const int length = modbus_receive_confirmation(context_, answer_);
-  const int error = errno;
-  last_frame_ = std::chrono::steady_clock::now();
-  if (length < 0) fail_with_errno(error);
-  // libmodbus reports a serial answer with another unit in it as one of length 0.
-  if (length == 0) throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
-
-  const int before = serial_ ? 1 : mbap_length;
-  const int after = serial_ ? 2 : 0;
-  if (length < before + after + 2) throw ModbusFailure{ModbusFault::damaged, "answer too short"};
-  if (!serial_) {
-    if (answer_[0] != high(transaction_) || answer_[1] != low(transaction_))
-      throw ModbusFailure{ModbusFault::damaged, "answer to another request"};
-    if (answer_[2] != 0 || answer_[3] != 0)
-      throw ModbusFailure{ModbusFault::damaged, "answer that is not Modbus"};
-    if (answer_[4] * 256 + answer_[5] != length - (mbap_length - 1))
-      throw ModbusFailure{ModbusFault::damaged, "answer with a wrong length"};
-  }
-  if (answer_[before - 1] != low(unit)) throw ModbusFailure{ModbusFault::damaged, "answer from another unit"};
-
-  const std::span<const std::uint8_t> pdu(answer_ + before,
-                                          static_cast<std::size_t>(length - before - after));
+  discard_stale_input();
+  const std::span<const std::uint8_t> pdu =
+      serial_ ? exchange_serial(unit, request, timeout) : exchange_tcp(unit, request, timeout);
   if (pdu[0] == (request[0] | exception_flag)) {
     const int code = pdu[1];
     throw ModbusFailure{code == 5 || code == 6 ? ModbusFault::busy : ModbusFault::refused,

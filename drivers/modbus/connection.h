@@ -1,6 +1,7 @@
 #pragma once
 
-/// Inside ModbusBus: one libmodbus context and one transaction over it. Not for other folders.
+/// Inside ModbusBus: one open connection, made by libmodbus, and one transaction over it. Not for other
+/// folders.
 
 #include <cstdint>
 #include <span>
@@ -12,6 +13,7 @@
 
 #include "core/base/clock.h"
 #include "drivers/modbus/modbus_bus.h"
+#include "drivers/modbus/rtu_answer.h"
 
 namespace eigenpose {
 
@@ -34,8 +36,10 @@ struct ModbusFailure {
 /// An open connection. Lives on one thread at a time. Closes in the destructor.
 class ModbusBus::Connection {
  public:
-  /// @throws ModbusFailure.
-  Connection(const ModbusBusOptions& options, Duration timeout);
+  /// @param address numeric. Waits for the connection up to `timeout`. @throws ModbusFailure.
+  Connection(const std::string& address, int port, Duration timeout);
+  /// Opens the port and locks it. @throws ModbusFailure.
+  Connection(const ModbusRtuEndpoint& line, Duration timeout);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
   ~Connection();
@@ -50,18 +54,26 @@ class ModbusBus::Connection {
   void drain(Duration silence, Duration limit);
 
  private:
+  void connect(Duration timeout);
   /// Sends the PDU `request` and returns the PDU of the answer, its unit and function checked.
   std::span<const std::uint8_t> exchange(int unit, std::span<const std::uint8_t> request, Duration timeout);
+  std::span<const std::uint8_t> exchange_tcp(int unit, std::span<const std::uint8_t> request,
+                                             Duration timeout);
+  std::span<const std::uint8_t> exchange_serial(int unit, std::span<const std::uint8_t> request,
+                                                Duration timeout);
+  void discard_stale_input();
   void send_tcp(int unit, std::span<const std::uint8_t> request);
-  void send_serial(int unit, std::span<const std::uint8_t> request);
+  void receive_serial(rtu::Answer& answer, std::chrono::steady_clock::time_point deadline);
+  void learn_echo(int unit, std::span<const std::uint8_t> request, Duration timeout);
   void wait_for_silent_interval();
 
   modbus_t* context_ = nullptr;
   bool serial_ = false;
   std::uint16_t transaction_ = 0;
+  rtu::Echo echo_ = rtu::Echo::unknown;  ///< of a serial line
   Duration silent_interval_{};
   std::chrono::steady_clock::time_point last_frame_{};
-  std::uint8_t answer_[MODBUS_MAX_ADU_LENGTH] = {};
+  std::vector<std::uint8_t> answer_;
 };
 
 }  // namespace eigenpose

@@ -1,14 +1,26 @@
 #include "drivers/modbus/endpoint.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "drivers/modbus/host_lookup.h"
 
 namespace eigenpose {
 
 namespace {
+
+/// What Linux and libmodbus know; libmodbus silently takes 9600 for any other.
+constexpr std::array baud_rates = {1200,    2400,    4800,    9600,    19200,   38400,  57600,
+                                   115200,  230400,  460800,  500000,  576000,  921600, 1000000,
+                                   1152000, 1500000, 2500000, 3000000, 3500000, 4000000};
 
 [[noreturn]] void refuse(std::string_view text, const std::string& what) {
   throw std::invalid_argument(fmt::format(
@@ -23,6 +35,10 @@ int number(std::string_view text, std::string_view digits, const char* what) {
   return value;
 }
 
+/// Of names, of addresses, and of the zone of an IPv6 address.
+constexpr std::string_view host_characters =
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:%";
+
 ModbusTcpEndpoint parse_tcp(std::string_view text, std::string_view rest) {
   ModbusTcpEndpoint endpoint;
   std::size_t host_end = rest.find(':');
@@ -36,6 +52,8 @@ ModbusTcpEndpoint parse_tcp(std::string_view text, std::string_view rest) {
     endpoint.host = rest.substr(0, host_end);
   }
   if (endpoint.host.empty()) refuse(text, "no host");
+  if (const std::size_t wrong = endpoint.host.find_first_not_of(host_characters); wrong != std::string::npos)
+    refuse(text, fmt::format("\"{}\" cannot stand in a host", endpoint.host[wrong]));
   const std::string_view after = rest.substr(host_end);
   if (!after.empty() && !after.starts_with(':')) refuse(text, "something stands behind the bracket");
   if (!after.empty()) endpoint.port = number(text, after.substr(1), "port");
@@ -71,10 +89,21 @@ ModbusRtuEndpoint parse_rtu(std::string_view text, std::string_view rest, const 
   }
   if (!rest.starts_with('/')) refuse(text, "the device must be a path from /");
   endpoint.device = rest;
+  try {
+    check_baud(endpoint.baud);
+  } catch (const std::invalid_argument& error) {
+    refuse(text, error.what());
+  }
   return endpoint;
 }
 
 }  // namespace
+
+void check_baud(int baud) {
+  if (std::find(baud_rates.begin(), baud_rates.end(), baud) == baud_rates.end())
+    throw std::invalid_argument(
+        fmt::format("no serial port has {} baud; allowed: {}", baud, fmt::join(baud_rates, ", ")));
+}
 
 std::variant<ModbusTcpEndpoint, ModbusRtuEndpoint> parse_modbus_endpoint(std::string_view text,
                                                                          const SerialDefaults& defaults) {
@@ -83,6 +112,15 @@ std::variant<ModbusTcpEndpoint, ModbusRtuEndpoint> parse_modbus_endpoint(std::st
   if (text.starts_with(tcp)) return parse_tcp(text, text.substr(tcp.size()));
   if (text.starts_with(rtu)) return parse_rtu(text, text.substr(rtu.size()), defaults);
   refuse(text, "neither tcp:// nor rtu:");
+}
+
+std::string line_name(const std::variant<ModbusTcpEndpoint, ModbusRtuEndpoint>& endpoint) {
+  if (const auto* tcp = std::get_if<ModbusTcpEndpoint>(&endpoint))
+    return fmt::format("tcp {}:{}", canonical_host(tcp->host), tcp->port);
+  const std::string& device = std::get<ModbusRtuEndpoint>(endpoint).device;
+  std::error_code failed;
+  const std::filesystem::path port = std::filesystem::weakly_canonical(device, failed);
+  return "serial " + (failed ? device : port.string());
 }
 
 }  // namespace eigenpose

@@ -9,6 +9,10 @@
 /// RS-485, where frames carry no number, the new connection first waits until the line has been silent as
 /// long as an answer may take.
 ///
+/// A transaction ends by its deadline whatever the other end does, one that sends without end included. A
+/// host's name is looked up once, by a thread of its own (HostLookup); a stop never waits for that. An
+/// adapter on a serial line may echo what is sent (rtu_answer.h).
+///
 /// The bus holds what it has spoken to against every other bus, in this program and others: a serial line as
 /// a whole, as long as it is open; behind a TCP gateway each unit, as long as the bus lives.
 
@@ -18,6 +22,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -26,6 +31,7 @@
 
 #include "core/base/clock.h"
 #include "drivers/device_claim.h"
+#include "drivers/modbus/host_lookup.h"
 
 namespace eigenpose {
 
@@ -48,6 +54,7 @@ struct ModbusBusOptions {
   Duration response_timeout = std::chrono::milliseconds(300);
   int attempts = 3;                                      ///< for one transaction, 1 … 10
   Duration retry_pause = std::chrono::milliseconds(50);  ///< between attempts
+  HostLookup::Resolver resolve = resolve_by_system;      ///< of a TCP host that is a name
 };
 
 /// Counts since the bus was made.
@@ -96,14 +103,20 @@ class ModbusBus {
   class Connection;
   using Work = std::function<void(Connection&, Duration)>;
 
+  class Turn;
+
   void transact(const ModbusCaller& caller, TimePoint deadline, const std::string& what, const Work& work);
+  /// One attempt, after waiting for its turn. Throws ModbusFailure.
+  void attempt(const ModbusCaller& caller, TimePoint deadline, const Work& work);
+  void connect(const ModbusCaller& caller, Duration timeout);
+  std::unique_ptr<Connection> connect_tcp(const ModbusTcpEndpoint& endpoint, const ModbusCaller& caller,
+                                          Duration timeout);
   void claim(int unit);
-  void enter(bool urgent);
-  void leave();
 
   ModbusBusOptions options_;
   const Clock& clock_;
   std::string description_;
+  std::optional<HostLookup> lookup_;  ///< of a TCP endpoint
 
   mutable std::mutex mutex_;
   std::condition_variable free_;
@@ -111,7 +124,7 @@ class ModbusBus {
   int urgent_waiting_ = 0;          ///< guarded by mutex_
   ModbusBusStatistics statistics_;  ///< guarded by mutex_
 
-  std::unique_ptr<Connection> connection_;  ///< belongs to whoever is between `enter` and `leave`
+  std::unique_ptr<Connection> connection_;  ///< belongs to whoever has his Turn
   bool line_suspect_ = false;               ///< likewise: a late answer may still come
   std::string gateway_;                     ///< likewise: the far end of the last TCP connection
   std::map<int, DeviceClaim> claims_;       ///< likewise: of the drives behind it, by unit

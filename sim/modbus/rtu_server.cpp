@@ -116,6 +116,7 @@ class SimRtuServer::Worker {
   FaultPlan& faults() { return faults_; }
   PduServer& pdus() { return pdus_; }
   [[nodiscard]] std::uint64_t requests() const { return requests_; }
+  void set_echo(bool echo) { echo_ = echo; }
 
  private:
   struct LateAnswer {
@@ -146,6 +147,7 @@ class SimRtuServer::Worker {
     for (;;) {
       const auto count = ::read(line_.get(), chunk, sizeof chunk);
       if (count <= 0) break;
+      if (echo_) send(Bytes(chunk, chunk + count));
       received_.insert(received_.end(), chunk, chunk + count);
       last_byte_ = now;
     }
@@ -211,6 +213,7 @@ class SimRtuServer::Worker {
   PduServer pdus_;
   FaultPlan faults_;
   std::atomic<std::uint64_t> requests_{0};
+  std::atomic<bool> echo_{false};
   std::mutex mutex_;
   Descriptor line_;               ///< guarded by mutex_: our end
   Descriptor far_end_;            ///< guarded by mutex_: the end that drivers open
@@ -232,6 +235,9 @@ AzDrive& SimRtuServer::drive(std::uint8_t unit) {
 }
 std::uint64_t SimRtuServer::requests() const {
   return worker_->requests();
+}
+void SimRtuServer::set_echo(bool echo) {
+  worker_->set_echo(echo);
 }
 void SimRtuServer::unplug() {
   worker_->unplug();

@@ -34,6 +34,9 @@ class SimRtuServer {
   /// Requests understood so far.
   [[nodiscard]] std::uint64_t requests() const;
 
+  /// The driver's adapter hears itself from now on: what is sent comes in again, before the answer.
+  void set_echo(bool echo);
+
   /// Pulls the adapter out: who has the port open gets an error, and its name is gone. The drives live on.
   void unplug();
   /// Puts it back under the same name.

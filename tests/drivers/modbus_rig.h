@@ -59,6 +59,8 @@ class ModbusRig final : public AxisRig {
   std::shared_ptr<ModbusBus> bus() { return bus_; }
   int port() { return tcp_->port(); }
   std::string line() { return (folder_.path() / "line").string(); }
+  /// The serial adapter hears itself.
+  void set_echo(bool echo) { rtu_->set_echo(echo); }
   /// Lets go of the line; `discard_axis` first.
   void hang_up() { bus_.reset(); }
   /// Lets the drive turn steadily, with nobody asking the driver. @param degrees_per_s above 0.
