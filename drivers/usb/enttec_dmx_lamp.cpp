@@ -58,43 +58,21 @@ bool take_answer(std::deque<std::uint8_t>& bytes, std::uint8_t label, std::size_
   return false;
 }
 
-void check_share(const std::string& name, double share) {
-  if (!(share >= 0.0 && share <= 1.0))
-    throw std::out_of_range(fmt::format("{}: share {} is outside 0 … 1", name, share));
-}
-
 }  // namespace
 
-EnttecDmxLamp::EnttecDmxLamp(EnttecDmxLampOptions options, std::unique_ptr<ByteLink> link, const Clock& clock)
-    : options_(std::move(options)),
-      link_(std::move(link)),
-      clock_(clock),
-      info_{options_.name, "Enttec DMX USB Pro"} {
-  if (!link_) throw std::invalid_argument("lamp " + options_.name + ": no link");
-  if (options_.channels.empty()) throw std::invalid_argument("lamp " + options_.name + ": no DMX channel");
-  for (const DmxChannel& channel : options_.channels) {
-    if (channel.number < 1 || channel.number > last_channel)
-      throw std::invalid_argument(fmt::format("lamp {}: DMX channel must be 1 … {}, got {}", options_.name,
-                                              last_channel, channel.number));
-    if (!(channel.share >= 0.0 && channel.share <= 1.0))
-      throw std::invalid_argument(
-          fmt::format("lamp {}: share {} is outside 0 … 1", options_.name, channel.share));
-  }
+EnttecDmxWidget::EnttecDmxWidget(EnttecDmxWidgetOptions options, std::unique_ptr<ByteLink> link,
+                                 const Clock& clock)
+    : options_(options), clock_(clock), link_(std::move(link)) {
+  if (!link_) throw std::invalid_argument("DMX USB Pro: no link");
   if (options_.attempts < 1 || options_.attempts > 10)
     throw std::invalid_argument(
-        fmt::format("lamp {}: attempts must be 1 … 10, got {}", options_.name, options_.attempts));
+        fmt::format("DMX USB Pro: attempts must be 1 … 10, got {}", options_.attempts));
 }
 
-EnttecDmxLamp::~EnttecDmxLamp() {
-  if (!may_be_lit_) return;
-  try {
-    show(0.0, options_.channels, clock_.now() + std::chrono::seconds(2));
-  } catch (const Error&) {
-    // Nobody is left to tell.
-  }
-}
+EnttecDmxWidget::~EnttecDmxWidget() = default;
 
-void EnttecDmxLamp::exchange(const std::vector<std::uint8_t>& frame, TimePoint deadline) {
+void EnttecDmxWidget::exchange(const std::string& lamp, const std::vector<std::uint8_t>& frame,
+                               TimePoint deadline) {
   if (link_suspect_) link_->reopen(std::min(deadline, clock_.now() + options_.response_timeout));
   link_->discard_input();
   const TimePoint patience = std::min(deadline, clock_.now() + options_.response_timeout);
@@ -104,64 +82,85 @@ void EnttecDmxLamp::exchange(const std::vector<std::uint8_t>& frame, TimePoint d
   std::deque<std::uint8_t> received;
   std::array<std::uint8_t, 128> buffer{};
   while (!take_answer(received, label_get_parameters, smallest_parameters)) {
-    const std::size_t count = link_->read(buffer, patience);
-    if (count == 0) throw DeviceTimeout(options_.name, "set level", "no answer");
+    // Bytes that keep coming are no answer either.
+    const std::size_t count = clock_.now() < patience ? link_->read(buffer, patience) : 0;
+    if (count == 0) throw DeviceTimeout(lamp, "set level", "no answer");
     received.insert(received.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(count));
   }
   link_suspect_ = false;
 }
 
-void EnttecDmxLamp::show(double level, const std::vector<DmxChannel>& channels, TimePoint deadline) {
-  int count = fewest_channels;
-  for (const DmxChannel& channel : channels) count = std::max(count, channel.number);
+void EnttecDmxWidget::show(const std::string& lamp, const Values& values, TimePoint deadline) {
+  const std::string operation = "set level";
+  if (clock_.now() >= deadline) throw DeviceTimeout(lamp, operation, "no time left before the deadline");
+  const std::lock_guard lock(mutex_);
+  Values all = shown_;
+  for (const auto& [channel, value] : values) all[channel] = value;
+  const int count = std::max(fewest_channels, all.empty() ? 0 : all.rbegin()->first);
   std::vector<std::uint8_t> data(static_cast<std::size_t>(count) + 1, 0);
   data[0] = dimmer_start_code;
-  for (const DmxChannel& channel : channels)
-    data[static_cast<std::size_t>(channel.number)] =
-        static_cast<std::uint8_t>(std::lround(255.0 * level * channel.share));
+  for (const auto& [channel, value] : all) data[static_cast<std::size_t>(channel)] = value;
   const std::vector<std::uint8_t> frame = message(label_send_dmx, data);
 
-  const std::string operation = fmt::format("set level {:.3f}", level);
-  if (clock_.now() >= deadline)
-    throw DeviceTimeout(options_.name, operation, "no time left before the deadline");
-  may_be_lit_ = true;
   for (int attempt = 1;; ++attempt) {
     try {
-      exchange(frame, deadline);
-      break;
+      exchange(lamp, frame, deadline);
+      shown_ = std::move(all);
+      return;
     } catch (const DeviceError& failure) {
       link_suspect_ = true;
       if (attempt < options_.attempts && clock_.now() < deadline) continue;
       const std::string where = fmt::format("{} (tried {} times)", link_->description(), attempt);
       if (dynamic_cast<const DeviceLost*>(&failure) != nullptr)
-        throw DeviceLost(options_.name, operation, fmt::format("{}: {}", where, failure.what()));
+        throw DeviceLost(lamp, operation, fmt::format("{}: {}", where, failure.what()));
       if (dynamic_cast<const DeviceTimeout*>(&failure) != nullptr)
-        throw DeviceTimeout(options_.name, operation,
-                            fmt::format("{}: no answer; is it a DMX USB Pro?", where));
-      throw DeviceError(options_.name, operation, fmt::format("{}: {}", where, failure.what()));
+        throw DeviceTimeout(lamp, operation, fmt::format("{}: no answer; is it a DMX USB Pro?", where));
+      throw DeviceError(lamp, operation, fmt::format("{}: {}", where, failure.what()));
     }
   }
+}
+
+EnttecDmxLamp::EnttecDmxLamp(EnttecDmxLampOptions options, std::shared_ptr<EnttecDmxWidget> widget,
+                             const Clock& clock)
+    : options_(std::move(options)),
+      widget_(std::move(widget)),
+      clock_(clock),
+      info_{options_.name, "Enttec DMX USB Pro"} {
+  if (!widget_) throw std::invalid_argument("lamp " + options_.name + ": no widget");
+  if (options_.channels.empty()) throw std::invalid_argument("lamp " + options_.name + ": no DMX channel");
+  for (const DmxChannel& channel : options_.channels) {
+    if (channel.number < 1 || channel.number > last_channel)
+      throw std::invalid_argument(fmt::format("lamp {}: DMX channel must be 1 … {}, got {}", options_.name,
+                                              last_channel, channel.number));
+    if (!(channel.share >= 0.0 && channel.share <= 1.0))
+      throw std::invalid_argument(
+          fmt::format("lamp {}: share {} is outside 0 … 1", options_.name, channel.share));
+  }
+}
+
+EnttecDmxLamp::~EnttecDmxLamp() {
+  if (!may_be_lit_) return;
+  try {
+    show(0.0, clock_.now() + std::chrono::seconds(2));
+  } catch (const Error&) {
+    // Nobody is left to report to.
+  }
+}
+
+void EnttecDmxLamp::show(double level, TimePoint deadline) {
+  EnttecDmxWidget::Values values;
+  for (const DmxChannel& channel : options_.channels)
+    values[channel.number] = static_cast<std::uint8_t>(std::lround(255.0 * level * channel.share));
+  if (clock_.now() < deadline) may_be_lit_ = true;
+  widget_->show(options_.name, values, deadline);
   may_be_lit_ = level > 0.0;
 }
 
 void EnttecDmxLamp::set_level(double level, TimePoint deadline) {
   if (!(level >= 0.0 && level <= 1.0))
     throw std::out_of_range(fmt::format("{}: level {} is outside 0 … 1", options_.name, level));
-  show(level, options_.channels, deadline);
+  show(level, deadline);
   level_ = level;
-}
-
-void EnttecDmxLamp::set_color(const std::vector<double>& shares, TimePoint deadline) {
-  if (shares.size() != options_.channels.size())
-    throw std::invalid_argument(
-        fmt::format("{}: {} shares for {} channels", options_.name, shares.size(), options_.channels.size()));
-  std::vector<DmxChannel> channels = options_.channels;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    check_share(options_.name, shares[i]);
-    channels[i].share = shares[i];
-  }
-  show(level_, channels, deadline);
-  options_.channels = std::move(channels);
 }
 
 }  // namespace eigenpose

@@ -1,10 +1,12 @@
 #pragma once
 
-/// A DMX512 lamp behind an Enttec DMX USB Pro: a level, spread over channels.
+/// DMX512 lamps behind an Enttec DMX USB Pro: each a level, spread over channels.
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -21,43 +23,67 @@ struct DmxChannel {
   double share = 1.0;  ///< 0 … 1 of the level
 };
 
-struct EnttecDmxLampOptions {
-  std::string name = "lamp";
-  std::vector<DmxChannel> channels = {{1, 1.0}};
+struct EnttecDmxWidgetOptions {
   Duration response_timeout = std::chrono::milliseconds(500);
   int attempts = 3;  ///< 1 … 10
 };
 
-/// Lives on one thread. Goes dark when destroyed.
+/// The Enttec DMX USB Pro: one line of 512 channels, which several lamps may share. Thread-safe.
 ///
-/// The widget repeats the last frame to the lamp by itself, so a level stays until it is changed. It does not
+/// It repeats the last frame to the lamps by itself, so a level stays until it is changed. It does not
 /// acknowledge frames; after each one it is asked for its parameters, and the answer shows that it still
 /// listens.
+class EnttecDmxWidget {
+ public:
+  /// Does not touch the device. @param clock must outlive the widget. @throws std::invalid_argument.
+  EnttecDmxWidget(EnttecDmxWidgetOptions options, std::unique_ptr<ByteLink> link, const Clock& clock);
+  EnttecDmxWidget(const EnttecDmxWidget&) = delete;
+  EnttecDmxWidget& operator=(const EnttecDmxWidget&) = delete;
+  ~EnttecDmxWidget();
+
+  /// What each channel shows, by its number, 1 … 512.
+  using Values = std::map<int, std::uint8_t>;
+
+  /// Shows `values` and leaves all other channels as they are. @param lamp opens the text of every error.
+  /// @throws DeviceError and its kinds; then other lamps' frames go on without these values.
+  void show(const std::string& lamp, const Values& values, TimePoint deadline);
+
+ private:
+  void exchange(const std::string& lamp, const std::vector<std::uint8_t>& frame, TimePoint deadline);
+
+  EnttecDmxWidgetOptions options_;
+  const Clock& clock_;
+  std::mutex mutex_;
+  std::unique_ptr<ByteLink> link_;  ///< guarded by mutex_
+  Values shown_;                    ///< guarded by mutex_: dark where there is none
+  bool link_suspect_ = false;       ///< guarded by mutex_: opened anew before the next use
+};
+
+struct EnttecDmxLampOptions {
+  std::string name = "lamp";
+  std::vector<DmxChannel> channels = {{1, 1.0}};
+};
+
+/// Lives on one thread. Goes dark when destroyed.
 class EnttecDmxLamp final : public Lamp {
  public:
   /// Does not touch the device. @param clock must outlive the lamp. @throws std::invalid_argument.
-  EnttecDmxLamp(EnttecDmxLampOptions options, std::unique_ptr<ByteLink> link, const Clock& clock);
+  EnttecDmxLamp(EnttecDmxLampOptions options, std::shared_ptr<EnttecDmxWidget> widget, const Clock& clock);
   ~EnttecDmxLamp() override;
 
   [[nodiscard]] const LampInfo& info() const override { return info_; }
   void set_level(double level, TimePoint deadline) override;
   [[nodiscard]] double level() const override { return level_; }
 
-  /// Changes the colour and shows it at the present level. @param shares one for each channel, 0 … 1.
-  /// @throws std::out_of_range; std::invalid_argument on another count; DeviceError and its kinds.
-  void set_color(const std::vector<double>& shares, TimePoint deadline);
-
  private:
-  void show(double level, const std::vector<DmxChannel>& channels, TimePoint deadline);
-  void exchange(const std::vector<std::uint8_t>& frame, TimePoint deadline);
+  void show(double level, TimePoint deadline);
 
   EnttecDmxLampOptions options_;
-  std::unique_ptr<ByteLink> link_;
+  std::shared_ptr<EnttecDmxWidget> widget_;
   const Clock& clock_;
   LampInfo info_;
   double level_ = 0.0;
   bool may_be_lit_ = false;
-  bool link_suspect_ = false;
 };
 
 }  // namespace eigenpose

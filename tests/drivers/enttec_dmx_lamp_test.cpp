@@ -1,5 +1,5 @@
-// The DMX lamp on a simulated widget: the conformance suite with and without a bad cable, channels and
-// colour.
+// The DMX lamp on a simulated widget: the conformance suite with and without a bad cable, channels, and lamps
+// that share a widget.
 
 #include "drivers/usb/enttec_dmx_lamp.h"
 
@@ -11,6 +11,7 @@
 #include "sim/usb/dmx_widget.h"
 #include "sim/usb/sim_link.h"
 #include "tests/drivers/lamp_conformance.h"
+#include "tests/drivers/scripted_link.h"
 
 namespace eigenpose {
 namespace {
@@ -31,13 +32,15 @@ const sim::CableFaults bad_cable{.lost_from_host = 0.05,
 class DmxRig final : public LampRig {
  public:
   explicit DmxRig(const sim::CableFaults& faults, std::vector<DmxChannel> channels = {{7, 1.0}})
-      : cable_(widget_, clock_), channel_(channels.front().number) {
+      : cable_(widget_, clock_), channel_(channels.empty() ? 0 : channels.front().number) {
     cable_.set_faults(faults);
-    EnttecDmxLampOptions options;
-    options.channels = std::move(channels);
-    options.response_timeout = 40ms;
-    options.attempts = 10;
-    lamp_ = std::make_unique<EnttecDmxLamp>(options, std::make_unique<sim::SimLink>(cable_, clock_), clock_);
+    dmx_ = std::make_shared<EnttecDmxWidget>(EnttecDmxWidgetOptions{.response_timeout = 40ms, .attempts = 10},
+                                             std::make_unique<sim::SimLink>(cable_, clock_), clock_);
+    lamp_ = another_lamp("lamp", std::move(channels));
+  }
+  /// On the same widget.
+  std::unique_ptr<EnttecDmxLamp> another_lamp(const std::string& name, std::vector<DmxChannel> channels) {
+    return std::make_unique<EnttecDmxLamp>(EnttecDmxLampOptions{name, std::move(channels)}, dmx_, clock_);
   }
   Lamp& lamp() override { return *lamp_; }
   void discard_lamp() override { lamp_.reset(); }
@@ -46,7 +49,6 @@ class DmxRig final : public LampRig {
   void unplug() override { cable_.unplug(); }
   void plug_in() override { cable_.plug_in(); }
 
-  EnttecDmxLamp& dmx() { return *lamp_; }
   sim::DmxWidget& widget() { return widget_; }
 
  private:
@@ -54,6 +56,7 @@ class DmxRig final : public LampRig {
   sim::DmxWidget widget_;
   sim::Cable cable_;
   int channel_;
+  std::shared_ptr<EnttecDmxWidget> dmx_;
   std::unique_ptr<EnttecDmxLamp> lamp_;
 };
 
@@ -72,17 +75,73 @@ TEST(EnttecDmxLamp, SpreadsTheLevelOverItsChannelsAndLeavesTheOthersDark) {
   for (int channel = 3; channel < 512; ++channel) ASSERT_EQ(rig.widget().channel(channel), 0) << channel;
 }
 
-TEST(EnttecDmxLamp, ChangesItsColourAtTheLevelItHas) {
-  DmxRig rig({}, {{1, 1.0}, {2, 1.0}, {3, 1.0}});
+TEST(EnttecDmxLamp, LampsOnOneWidgetLeaveEachOtherAsTheyAre) {
+  DmxRig rig({}, {{1, 1.0}});
+  auto fill = rig.another_lamp("fill", {{30, 1.0}});
   rig.lamp().set_level(1.0, soon());
-  rig.dmx().set_color({1.0, 0.0, 0.2}, soon());
+  fill->set_level(0.2, soon());
   EXPECT_EQ(rig.widget().channel(1), 255);
-  EXPECT_EQ(rig.widget().channel(2), 0);
-  EXPECT_EQ(rig.widget().channel(3), 51);
-  rig.lamp().set_level(0.0, soon());
+  EXPECT_EQ(rig.widget().channel(30), 51);
+  rig.lamp().set_level(0.4, soon());
+  EXPECT_EQ(rig.widget().channel(1), 102);
+  EXPECT_EQ(rig.widget().channel(30), 51);
+  fill.reset();
+  EXPECT_EQ(rig.widget().channel(30), 0);
+  EXPECT_EQ(rig.widget().channel(1), 102) << "the other one still shines";
+}
+
+TEST(EnttecDmxLamp, ALevelThatFailedIsNotShownByAnotherLampsFrame) {
+  DmxRig rig({}, {{1, 1.0}});
+  auto fill = rig.another_lamp("fill", {{2, 1.0}});
+  rig.silence(true);
+  EXPECT_THROW(rig.lamp().set_level(1.0, soon()), DeviceError);
+  rig.silence(false);
+  fill->set_level(1.0, soon());
+  EXPECT_EQ(rig.widget().channel(2), 255);
   EXPECT_EQ(rig.widget().channel(1), 0);
-  EXPECT_THROW(rig.dmx().set_color({1.0}, soon()), std::invalid_argument);
-  EXPECT_THROW(rig.dmx().set_color({1.0, 0.0, 1.5}, soon()), std::out_of_range);
+}
+
+std::vector<std::uint8_t> parameters() {
+  return {0x7E, 3, 5, 0, 44, 1, 9, 1, 40, 0xE7};
+}
+
+TEST(EnttecDmxWidget, AnAnswerThatWasThereBeforeTheRequestIsNone) {
+  const SteadyClock clock;
+  auto link = std::make_unique<test::ScriptedLink>(clock);
+  test::ScriptedLink& far_end = *link;
+  far_end.say(parameters());
+  EnttecDmxWidget widget({.response_timeout = 10ms, .attempts = 1}, std::move(link), clock);
+  EXPECT_THROW(widget.show("lamp", {{1, 255}}, soon()), DeviceTimeout);
+  far_end.on_write = [&](std::span<const std::uint8_t> bytes) {
+    if (bytes[1] == 3) far_end.say(parameters());
+  };
+  EXPECT_NO_THROW(widget.show("lamp", {{1, 255}}, soon()));
+}
+
+TEST(EnttecDmxWidget, TriesAsOftenAsItMayAndNotOnceMore) {
+  const SteadyClock clock;
+  for (const int attempts : {1, 3}) {
+    auto link = std::make_unique<test::ScriptedLink>(clock);
+    test::ScriptedLink& far_end = *link;
+    int frames = 0;
+    far_end.on_write = [&](std::span<const std::uint8_t> bytes) { frames += bytes[1] == 6 ? 1 : 0; };
+    EnttecDmxWidget widget({.response_timeout = 5ms, .attempts = attempts}, std::move(link), clock);
+    EXPECT_THROW(widget.show("lamp", {{1, 255}}, soon()), DeviceTimeout);
+    EXPECT_EQ(frames, attempts);
+    EXPECT_EQ(far_end.reopenings, attempts - 1);
+  }
+}
+
+TEST(EnttecDmxWidget, BytesWithoutEndAreNoAnswer) {
+  const SteadyClock clock;
+  for (const std::vector<std::uint8_t>& bytes :
+       {std::vector<std::uint8_t>(128, 0x7E), std::vector<std::uint8_t>(128, 0),
+        std::vector<std::uint8_t>{0x7E, 10, 4, 0, 1, 2, 3, 4, 0xE7}}) {
+    auto link = std::make_unique<test::ScriptedLink>(clock);
+    link->flood = bytes;
+    EnttecDmxWidget widget({.response_timeout = 20ms, .attempts = 2}, std::move(link), clock);
+    EXPECT_THROW(widget.show("lamp", {{1, 255}}, soon()), DeviceTimeout);
+  }
 }
 
 TEST(EnttecDmxLamp, SendsNoFrameBeforeItIsAskedTo) {
@@ -98,6 +157,8 @@ TEST(EnttecDmxLamp, ImpossibleChannelsAreRefused) {
   refused({{0, 1.0}});
   refused({{513, 1.0}});
   refused({{1, 1.1}});
+  refused({{1, -0.1}});
+  refused({});
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "drivers/usb/ftdi_baud.h"
 
 namespace eigenpose {
 namespace {

@@ -236,13 +236,13 @@ INSTANTIATE_TEST_SUITE_P(AptOnUsb, AxisConformance,
 class UsbDmxRig final : public LampRig {
  public:
   UsbDmxRig() : socket_(widget_) {
-    EnttecDmxLampOptions options;
-    options.channels = {{7, 1.0}};
-    options.response_timeout = 200ms;
-    options.attempts = 3;
     auto link = std::make_unique<FtdiLink>(FtdiLinkOptions{.serial = chip().serial()}, clock_);
     link->reopen(clock_.now() + patience);
-    lamp_ = std::make_unique<EnttecDmxLamp>(options, std::move(link), clock_);
+    lamp_ = std::make_unique<EnttecDmxLamp>(
+        EnttecDmxLampOptions{.channels = {{7, 1.0}}},
+        std::make_shared<EnttecDmxWidget>(EnttecDmxWidgetOptions{.response_timeout = 200ms, .attempts = 3},
+                                          std::move(link), clock_),
+        clock_);
   }
   Lamp& lamp() override { return *lamp_; }
   void discard_lamp() override { lamp_.reset(); }
