@@ -66,7 +66,7 @@ int list(const LabOptions& options) {
   }
   for (const sim::CatalogEntry& entry : lab.objects()) {
     std::printf("%-14s%s%s%s\n", entry.name.c_str(), entry.symmetric ? " looks the same at every angle" : "",
-                entry.stranger ? " kept as a stranger, not to be learned" : "",
+                entry.held_out ? " held out: not to be learned" : "",
                 entry.recorded ? " recorded photographs" : "");
   }
   return exit_done;

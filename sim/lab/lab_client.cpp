@@ -91,7 +91,7 @@ std::vector<CatalogEntry> LabClient::objects() {
   const Json answer = connection_->ask({{"do", "objects"}});
   for (const Json& object : answer.at("objects")) {
     entries.push_back({object.value("name", ""), object.value("symmetric", false),
-                       object.value("stranger", false), object.value("recorded", false)});
+                       object.value("held_out", false), object.value("recorded", false)});
   }
   return entries;
 }
@@ -143,7 +143,7 @@ Truth LabClient::truth() {
     truth.objects.push_back({object.value("id", std::uint64_t{0}), object.value("name", ""),
                              degrees(object.value("angle_deg", 0.0)), degrees(object.value("yaw_deg", 0.0)),
                              object.value("x_mm", 0.0), object.value("y_mm", 0.0),
-                             object.value("symmetric", false), object.value("stranger", false),
+                             object.value("symmetric", false), object.value("held_out", false),
                              object.value("carried", false)});
   }
   return truth;

@@ -47,7 +47,7 @@ Json objects_of(const SimLab& lab) {
   for (const CatalogEntry& entry : lab.objects()) {
     list.push_back({{"name", entry.name},
                     {"symmetric", entry.symmetric},
-                    {"stranger", entry.stranger},
+                    {"held_out", entry.held_out},
                     {"recorded", entry.recorded}});
   }
   return {{"objects", list}};
@@ -64,7 +64,7 @@ Json truth_of(const SimLab& lab) {
                        {"x_mm", object.x_mm},
                        {"y_mm", object.y_mm},
                        {"symmetric", object.symmetric},
-                       {"stranger", object.stranger},
+                       {"held_out", object.held_out},
                        {"carried", object.carried}});
   }
   return {{"time_s", seconds_of(truth.time)},

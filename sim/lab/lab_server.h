@@ -7,11 +7,11 @@
 ///   "id": 7}
 ///   {"do": "remove", "id": 7, "hand": true} · {"do": "clear"} · {"do": "hand", "in": true} · {"do": "lamp",
 ///   "level": 0.5}
-///   {"do": "objects"} → {"ok": true, "objects": [{"name", "symmetric", "stranger", "recorded"}]}
+///   {"do": "objects"} → {"ok": true, "objects": [{"name", "symmetric", "held_out", "recorded"}]}
 ///   {"do": "truth"}   → {"ok": true, "time_s", "table_deg", "arm_azimuth_deg", "arm_elevation_deg",
 ///   "lamp_level", "moving",
 ///                        "hand_in_view", "objects": [{"id", "name", "angle_deg", "yaw_deg", "x_mm", "y_mm",
-///                        "symmetric", "stranger", "carried"}]}
+///                        "symmetric", "held_out", "carried"}]}
 ///   {"do": "camera_faults", "stalled", "lost", "extra_noise", "damaged_fraction"}: those not named are off
 ///   {"do": "drive_faults", "unit": 1, "stuck", "slip_steps", "backlash_deg", "dead"}: the same
 ///   {"do": "wire_fault", "kind": "silence", "times": 1, "skip": 0, "delay_ms": 300, "exception_code": 4}

@@ -27,18 +27,6 @@ std::size_t index_of(LabAxis axis) {
 
 }  // namespace
 
-std::string_view lab_axis_name(LabAxis axis) {
-  switch (axis) {
-    case LabAxis::table:
-      return "table";
-    case LabAxis::arm_azimuth:
-      return "arm_azimuth";
-    case LabAxis::arm_elevation:
-      return "arm_elevation";
-  }
-  return "unknown";
-}
-
 SimLab::SimLab(const Clock& clock, SimLabOptions options) : clock_(clock), options_(options) {
   const TimePoint begin{};  // a trajectory stands still before its start
   axes_[index_of(LabAxis::table)] = {Trajectory::standstill(options.table_deg, begin)};
@@ -46,7 +34,7 @@ SimLab::SimLab(const Clock& clock, SimLabOptions options) : clock_(clock), optio
   axes_[index_of(LabAxis::arm_elevation)] = {Trajectory::standstill(options.arm_elevation_deg, begin)};
   hand_ = {Trajectory::standstill(0.0, begin)};
   for (const ObjectDescription& object : built_objects()) {
-    catalog_.push_back({object.name, object.symmetric, object.stranger, false});
+    catalog_.push_back({object.name, object.symmetric, object.held_out, false});
   }
 }
 
@@ -268,7 +256,7 @@ Truth SimLab::truth_at(TimePoint when) const {
     if (when < p.since || when >= p.gone) continue;
     const CatalogEntry entry = find_entry(p.name).value_or(CatalogEntry{});
     truth.objects.push_back({p.id, p.name, full_turn(p.yaw.degrees() + truth.table.degrees()),
-                             full_turn(p.yaw.degrees()), p.x_mm, p.y_mm, entry.symmetric, entry.stranger,
+                             full_turn(p.yaw.degrees()), p.x_mm, p.y_mm, entry.symmetric, entry.held_out,
                              when < p.set_down || when >= p.picked_up});
   }
   return truth;

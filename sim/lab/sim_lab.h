@@ -10,7 +10,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/base/angle.h"
@@ -22,14 +21,12 @@ namespace eigenpose::sim {
 
 enum class LabAxis { table, arm_azimuth, arm_elevation };
 inline constexpr std::size_t lab_axis_count = 3;
-/// "table", "arm_azimuth", "arm_elevation".
-std::string_view lab_axis_name(LabAxis axis);
 
 /// What can be placed.
 struct CatalogEntry {
   std::string name;
   bool symmetric = false;  ///< looks the same at every angle: its pose can't be seen
-  bool stranger = false;   ///< kept from learning, to test that it is reported as unknown
+  bool held_out = false;   ///< kept from learning, to test that it is reported as unknown
   bool recorded = false;   ///< exists as photographs only (ReplayCamera)
 };
 
@@ -52,7 +49,7 @@ struct TrueObject {
   double x_mm = 0.0;  ///< from the table's axis, in the table's frame
   double y_mm = 0.0;
   bool symmetric = false;
-  bool stranger = false;
+  bool held_out = false;
   bool carried = false;  ///< in the hand, not standing
 };
 

@@ -5,62 +5,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "sim/modbus/az_registers.h"
+
 namespace eigenpose::sim {
 namespace {
-
-// Registers -----------------------------------------------------------------------------------------------
-constexpr std::uint16_t reg_operation_type = 0x005A;
-constexpr std::uint16_t reg_position = 0x005C;
-constexpr std::uint16_t reg_speed = 0x005E;
-constexpr std::uint16_t reg_changing_rate = 0x0060;
-constexpr std::uint16_t reg_stopping_rate = 0x0062;
-constexpr std::uint16_t reg_data_number = 0x0058;
-constexpr std::uint16_t reg_trigger = 0x0066;
-constexpr std::uint16_t reg_input_automatic_off = 0x0078;
-constexpr std::uint16_t reg_input = 0x007C;
-constexpr std::uint16_t reg_output = 0x007E;
-constexpr std::uint16_t reg_alarm = 0x0080;
-constexpr std::uint16_t reg_command_position = 0x00C6;
-constexpr std::uint16_t reg_command_speed_rpm = 0x00C8;
-constexpr std::uint16_t reg_command_speed_hz = 0x00CA;
-constexpr std::uint16_t reg_feedback_position = 0x00CC;
-constexpr std::uint16_t reg_feedback_speed_rpm = 0x00CE;
-constexpr std::uint16_t reg_feedback_speed_hz = 0x00D0;
-constexpr std::uint16_t reg_alarm_reset = 0x0180;
-constexpr std::uint16_t reg_preset = 0x018A;
-constexpr std::uint16_t reg_communication_timeout = 0x138A;
-
-struct Range {
-  std::uint16_t first;
-  std::uint16_t last;
-};
-/// What can be read and written back.
-constexpr Range kept_ranges[] = {
-    {0x0058, 0x0069}, {0x0078, 0x007D}, {0x0180, 0x0181}, {0x018A, 0x018B}, {0x1380, 0x1393}};
-/// What can only be read.
-constexpr Range monitor_ranges[] = {{0x007E, 0x0081}, {0x00C6, 0x00D1}};
-
-template <std::size_t n>
-bool within(const Range (&ranges)[n], std::uint16_t address) {
-  return std::any_of(std::begin(ranges), std::end(ranges),
-                     [&](const Range& r) { return address >= r.first && address <= r.last; });
-}
-
-// Input and output bits -----------------------------------------------------------------------------------
-constexpr unsigned in_zhome = 1U << 4U;
-constexpr unsigned in_stop = 1U << 5U;
-constexpr unsigned in_free = 1U << 6U;
-constexpr unsigned in_alarm_reset = 1U << 7U;
-constexpr unsigned in_forward = 1U << 14U;
-constexpr unsigned in_reverse = 1U << 15U;
-/// START and what moves by stored operation data.
-constexpr unsigned in_unserved = (1U << 3U) | (1U << 8U) | (1U << 9U) | (1U << 10U) | (1U << 11U);
-
-constexpr unsigned out_home_end = 1U << 4U;
-constexpr unsigned out_ready = 1U << 5U;
-constexpr unsigned out_alarm = 1U << 7U;
-constexpr unsigned out_move = 1U << 13U;
-constexpr unsigned out_in_position = 1U << 14U;
 
 constexpr int alarm_position_deviation = 0x10;
 constexpr int alarm_home_incomplete = 0x4A;
@@ -244,67 +192,69 @@ ModbusException AzDrive::trigger_after_write(std::uint16_t first, std::uint16_t 
   return ModbusException::none;
 }
 
+// Operation types 7 and 16 turn without an end; the others go to a target.
 ModbusException AzDrive::start_direct_operation(TimePoint now) {
   if (alarm_ != 0 || (input_ & (in_stop | in_free)) != 0 || homing_) return ModbusException::device_failure;
-  const double position = stored(reg_position);
+  const std::int32_t type = stored(reg_operation_type);
   const double speed = stored(reg_speed);
   const MotionLimits limits = scaled(std::abs(speed), stored(reg_changing_rate), stored(reg_stopping_rate));
-  const double turn = 360.0 * options_.steps_per_degree;
-  const double here = command_.position(now);
-  const bool absolute = stored(reg_operation_type) == 1 || stored(reg_operation_type) >= 8;
-  if (absolute && stored(reg_operation_type) != 16 && !homed_) {
+  const bool needs_home = type == 1 || (type >= 8 && type != 16);
+  if (needs_home && !homed_) {
     alarm_now(alarm_home_incomplete, now);
     return ModbusException::none;
   }
-  double target = 0.0;
-  switch (stored(reg_operation_type)) {
+  if (type == 7 || type == 16) {
+    slipped_ = 0.0;
+    move(speed == 0.0 ? command_.stop(limits.deceleration, now)
+                      : command_.run(speed > 0.0 ? 1 : -1, limits, now),
+         now);
+    return ModbusException::none;
+  }
+  const std::optional<double> target = direct_target(type, now);
+  if (!target) {
+    alarm_now(alarm_operation_data, now);
+    return ModbusException::none;
+  }
+  go_to(*target, limits, now);
+  return ModbusException::none;
+}
+
+std::optional<double> AzDrive::direct_target(std::int32_t type, TimePoint now) const {
+  const double position = stored(reg_position);
+  const double turn = 360.0 * options_.steps_per_degree;
+  const double here = command_.position(now);
+  switch (type) {
     case 1:
-      target = position;
-      break;
+      return position;
     case 2:
-      target = here + position;
-      break;
+      return here + position;
     case 3:
-      target = feedback(now) + position;
-      break;
-    case 7:
-    case 16:
-      slipped_ = 0.0;
-      move(speed == 0.0 ? command_.stop(limits.deceleration, now)
-                        : command_.run(speed > 0.0 ? 1 : -1, limits, now),
-           now);
-      return ModbusException::none;
+      return feedback(now) + position;
     case 8:
-      target = std::floor(here / turn) * turn + position;
-      break;
+      return std::floor(here / turn) * turn + position;
     case 9:
-      target = here + circular_difference(position, here, turn);
-      break;
+      return here + circular_difference(position, here, turn);
     case 10:
-      target = here + wrap(position - here, 0.0, turn);
-      break;
+      return here + wrap(position - here, 0.0, turn);
     case 11:
-      target = here - wrap(here - position, 0.0, turn);
-      break;
+      return here - wrap(here - position, 0.0, turn);
     default:
-      alarm_now(alarm_operation_data, now);
-      return ModbusException::none;
+      return std::nullopt;
   }
+}
+
+void AzDrive::go_to(double target, const MotionLimits& limits, TimePoint now) {
   alarm_at_rest_.reset();
-  const double lower =
-      options_.lower_deg ? (*options_.lower_deg - zero_deg_) * options_.steps_per_degree : -1e9;
-  const double upper =
-      options_.upper_deg ? (*options_.upper_deg - zero_deg_) * options_.steps_per_degree : 1e9;
-  if (target < lower || target > upper) {
-    target = std::clamp(target, lower, upper);
-    alarm_at_rest_ = alarm_software_overtravel;
-  }
+  const auto limit = [&](const std::optional<double>& degrees, double none) {
+    return degrees ? (*degrees - zero_deg_) * options_.steps_per_degree : none;
+  };
+  const double reached = std::clamp(target, limit(options_.lower_deg, -1e9), limit(options_.upper_deg, 1e9));
+  if (reached != target) alarm_at_rest_ = alarm_software_overtravel;
   // A motor that stands off its command, after a slip, is commanded from where it is.
   if (!command_.moving(now) && slipped_ != 0.0) command_ = Trajectory::standstill(feedback(now), now);
   slipped_ = 0.0;
-  target_ = target;
-  move(command_.move_to(target, limits, now), now);
-  return ModbusException::none;
+  target_ = reached;
+  move(command_.move_to(reached, limits, now), now);
 }
 
 void AzDrive::start_homing(TimePoint now) {

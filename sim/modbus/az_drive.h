@@ -89,6 +89,9 @@ class AzDrive {
   [[nodiscard]] bool ready(TimePoint now) const;
   bool apply_input(std::uint16_t bits, TimePoint now);
   ModbusException start_direct_operation(TimePoint now);
+  /// Where an operation of this type ends, in steps; nothing for a type that this drive does not serve.
+  [[nodiscard]] std::optional<double> direct_target(std::int32_t type, TimePoint now) const;
+  void go_to(double target, const MotionLimits& limits, TimePoint now);
   ModbusException trigger_after_write(std::uint16_t first, std::uint16_t last, TimePoint now);
   void start_homing(TimePoint now);
   void preset(TimePoint now);

@@ -12,7 +12,7 @@ namespace eigenpose::sim {
 struct ObjectDescription {
   std::string name;
   bool symmetric = false;  ///< looks the same at every angle
-  bool stranger = false;   ///< kept from learning
+  bool held_out = false;   ///< kept from learning
   Shape shape;
 };
 

@@ -26,7 +26,7 @@ Shape duck();
 Shape cat();
 Shape pig();
 Shape pig_patched();
-// strangers.cpp
+// objects_held_out.cpp
 Shape rocket();
 Shape snail();
 Shape kettle_bell();

@@ -17,10 +17,10 @@ struct Lab : testing::Test {
 TEST_F(Lab, HasTwelveObjectsToLearnAmongThemASymmetricOneAndTwoStrangersBeside) {
   int learnable = 0;
   int symmetric = 0;
-  int strangers = 0;
+  int held_out = 0;
   for (const CatalogEntry& entry : lab.objects()) {
-    if (entry.stranger) {
-      ++strangers;
+    if (entry.held_out) {
+      ++held_out;
     } else {
       ++learnable;
       symmetric += entry.symmetric ? 1 : 0;
@@ -28,7 +28,7 @@ TEST_F(Lab, HasTwelveObjectsToLearnAmongThemASymmetricOneAndTwoStrangersBeside) 
   }
   EXPECT_GE(learnable, 12);
   EXPECT_GE(symmetric, 1);
-  EXPECT_GE(strangers, 2);
+  EXPECT_GE(held_out, 2);
 }
 
 TEST_F(Lab, TheTableTurnsWhatStandsOnIt) {
