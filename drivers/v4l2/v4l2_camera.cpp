@@ -154,7 +154,6 @@ V4l2Camera::~V4l2Camera() = default;
 
 std::unique_ptr<V4l2Camera::Session> V4l2Camera::open_session() {
   const std::string& name = options_.name;
-  const bool first = info_.width == 0;
   OpeningReport report;
   report.node = find_camera(system_.nodes(), options_.selector, name);
 
@@ -163,15 +162,38 @@ std::unique_ptr<V4l2Camera::Session> V4l2Camera::open_session() {
   session->device = system_.open(report.node.path, error);
   if (session->device == nullptr) throw_device_error(name, "opening " + report.node.path, error);
   VideoDevice& device = *session->device;
-  if (options_.input) {
-    int input = *options_.input;
-    if (const int refused = device.control(VIDIOC_S_INPUT, &input); refused != 0) {
-      throw_device_error(name, "choosing input " + std::to_string(*options_.input), refused);
-    }
-  }
+  choose_input(device);
+  set_mode(*session, report);
 
-  const auto modes = offered_modes(device, options_.mode);
-  const auto best = best_mode(modes, options_.mode);
+  CameraControls controls(device);
+  set_controls(controls, report);
+  session->stream = std::make_unique<BufferStream>(device, name, options_.buffers, clock_);
+  FrameTiming timing;
+  timing.interval = session->interval;
+  timing.exposure = controls.locked_exposure();
+  timing.internal_frames = options_.internal_frames;
+  ledger_.restart(timing, clock_.now());
+  waited_ = {};
+
+  const bool first = info_.width == 0;
+  describe_session(*session, report, controls);
+  if (first) remember_controls(controls);
+  report_ = std::move(report);
+  note_opening();
+  return session;
+}
+
+void V4l2Camera::choose_input(VideoDevice& device) const {
+  if (!options_.input) return;
+  int input = *options_.input;
+  if (const int refused = device.control(VIDIOC_S_INPUT, &input); refused != 0)
+    throw_device_error(options_.name, "choosing input " + std::to_string(*options_.input), refused);
+}
+
+void V4l2Camera::set_mode(Session& session, OpeningReport& report) const {
+  const std::string& name = options_.name;
+  VideoDevice& device = *session.device;
+  const auto best = best_mode(offered_modes(device, options_.mode), options_.mode);
   if (!best) {
     throw DeviceError(
         name, "choosing a mode",
@@ -183,67 +205,67 @@ std::unique_ptr<V4l2Camera::Session> V4l2Camera::open_session() {
   const v4l2_format format = set_format(device, name, *best);
   report.granted = *best;
   report.granted.fourcc = format.fmt.pix.pixelformat;
-  report.granted.width = session->width = static_cast<int>(format.fmt.pix.width);
-  report.granted.height = session->height = static_cast<int>(format.fmt.pix.height);
-  if (!first && (session->width != info_.width || session->height != info_.height)) {
+  report.granted.width = session.width = static_cast<int>(format.fmt.pix.width);
+  report.granted.height = session.height = static_cast<int>(format.fmt.pix.height);
+  const bool first = info_.width == 0;
+  if (!first && (session.width != info_.width || session.height != info_.height)) {
     throw DeviceError(name, "opening " + report.node.path,
                       "another camera: it grants " + to_string(report.granted) + ", before it was " +
                           std::to_string(info_.width) + "x" + std::to_string(info_.height));
   }
   report.granted.frames_per_second = set_rate(device, best->frames_per_second);
-  session->interval = std::chrono::duration_cast<Duration>(
+  session.interval = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(1.0 / report.granted.frames_per_second));
+  session.decoder =
+      std::make_unique<PixelDecoder>(layout_of(format.fmt.pix, best->format), options_.mode.color);
+}
 
-  CameraControls controls(device);
+void V4l2Camera::set_controls(CameraControls& controls, OpeningReport& report) const {
+  const bool first = info_.width == 0;
   if (options_.lock_automatics) report.controls = controls.lock_automatics();
   const auto wanted = controls.apply(first ? options_.controls : locked_controls_);
   report.controls.insert(report.controls.end(), wanted.begin(), wanted.end());
   for (const ControlResult& result : wanted) {
     if (first && (!result.granted || !result.problem.empty())) {
-      throw DeviceError(name, "setting " + result.name + " = " + std::to_string(result.requested),
+      throw DeviceError(options_.name, "setting " + result.name + " = " + std::to_string(result.requested),
                         result.problem);
     }
   }
+}
 
-  session->decoder =
-      std::make_unique<PixelDecoder>(layout_of(format.fmt.pix, best->format), options_.mode.color);
-  session->stream = std::make_unique<BufferStream>(device, name, options_.buffers, clock_);
-  FrameTiming timing;
-  timing.interval = session->interval;
-  timing.exposure = controls.locked_exposure();
-  timing.internal_frames = options_.internal_frames;
-  ledger_.restart(timing, clock_.now());
-  waited_ = {};
-
-  info_.name = name;
+void V4l2Camera::describe_session(const Session& session, const OpeningReport& report,
+                                  const CameraControls& controls) {
+  info_.name = options_.name;
   info_.model = report.node.name;
   info_.serial = report.node.serial;
   info_.format = name_of(report.granted.format);
-  info_.width = session->width;
-  info_.height = session->height;
+  info_.width = session.width;
+  info_.height = session.height;
   info_.frames_per_second = report.granted.frames_per_second;
   info_.controls = controls.snapshot();
-  if (first) {
-    for (const ControlInfo& control : controls.list()) {
-      const auto value = info_.controls.find(control.name);
-      if (control.settable && value != info_.controls.end() &&
-          (options_.controls.contains(control.name) ||
-           (options_.lock_automatics && is_picture_control(control.id)))) {
-        locked_controls_.insert(*value);
-      }
+}
+
+void V4l2Camera::remember_controls(const CameraControls& controls) {
+  for (const ControlInfo& control : controls.list()) {
+    const auto value = info_.controls.find(control.name);
+    if (control.settable && value != info_.controls.end() &&
+        (options_.controls.contains(control.name) ||
+         (options_.lock_automatics && is_picture_control(control.id)))) {
+      locked_controls_.insert(*value);
     }
   }
-  report_ = std::move(report);
-  note("camera=" + name + " opened=" + report_.node.path + " model=\"" + info_.model +
+}
+
+void V4l2Camera::note_opening() const {
+  note("camera=" + options_.name + " opened=" + report_.node.path + " model=\"" + info_.model +
        "\" serial=" + info_.serial + " asked=\"" + to_string(report_.requested) + "\" granted=\"" +
        to_string(report_.granted) + "\"");
   for (const ControlResult& result : report_.controls) {
     if (!result.problem.empty()) {
-      note("camera=" + name + " control=" + result.name + " asked=" + std::to_string(result.requested) +
-           " problem=\"" + result.problem + "\"");
+      note("camera=" + options_.name + " control=" + result.name +
+           " asked=" + std::to_string(result.requested) + " problem=\"" + result.problem + "\"");
     }
   }
-  return session;
 }
 
 void V4l2Camera::reopen(TimePoint deadline, const std::stop_token& stop) {

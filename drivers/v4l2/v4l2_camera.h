@@ -82,6 +82,14 @@ class V4l2Camera final : public Camera {
   struct Candidate;
 
   std::unique_ptr<Session> open_session();
+  void choose_input(VideoDevice& device) const;
+  /// Format, size and rate, and the decoder for them.
+  void set_mode(Session& session, OpeningReport& report) const;
+  void set_controls(CameraControls& controls, OpeningReport& report) const;
+  void describe_session(const Session& session, const OpeningReport& report, const CameraControls& controls);
+  /// What to set again after the camera was lost.
+  void remember_controls(const CameraControls& controls);
+  void note_opening() const;
   void reopen(TimePoint deadline, const std::stop_token& stop);
   Frame frame_from_session(TimePoint deadline, const std::stop_token& stop);
   /// Takes all filled buffers and keeps the newest good one in `newest`. @return true if every buffer was

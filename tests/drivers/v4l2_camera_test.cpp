@@ -199,6 +199,15 @@ TEST_F(V4l2CameraTest, DatesNoFrameLaterThanItsFirstPhoton) {
             std::chrono::floor<std::chrono::microseconds>(clock_.now()) - interval - 10ms);
 }
 
+TEST_F(V4l2CameraTest, DatesFramesEarlierByWhatTheCameraMayHold) {
+  options_.controls = {{"exposure_time_absolute", 100}};  // 10 ms
+  options_.internal_frames = 2;
+  open();
+  const Frame frame = next();
+  EXPECT_EQ(frame.exposure_start,
+            std::chrono::floor<std::chrono::microseconds>(clock_.now()) - 3 * interval - 10ms);
+}
+
 TEST_F(V4l2CameraTest, DatesFramesByTheirBufferWhenStampsAreNonsense) {
   FakeCamera fake = usual_camera();
   fake.stamp = FakeStamp::nonsense;
