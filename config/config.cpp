@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "config/device_conflicts.h"
 #include "config/toml_table.h"
 #include "core/base/error.h"
+#include "drivers/modbus/endpoint.h"
 #include "drivers/usb/apt_stage.h"
 
 namespace eigenpose {
@@ -106,31 +108,22 @@ CameraOptions read_camera(const TomlTable& table, const std::filesystem::path& b
   return options;
 }
 
-AxisOptions read_axis(const TomlTable& table, const std::filesystem::path& base) {
-  AxisOptions options;
-  Dof& dof = options.dof;
-  dof.name = read_name(table, "name");
-  options.driver = table.choice("driver", std::nullopt, {"modbus", "apt"});
-  options.endpoint = table.text("endpoint");
-  const bool known = options.endpoint == "simulated" ||
-                     options.endpoint.starts_with(options.driver == "modbus" ? "tcp://" : "usb:") ||
-                     (options.driver == "modbus" && options.endpoint.starts_with("rtu:/"));
-  if (!known)
-    table.fail("endpoint",
-               fmt::format("\"{}\" is not understood; allowed: {}, \"simulated\"", options.endpoint,
-                           options.driver == "modbus" ? "\"tcp://HOST:PORT\", \"rtu:/dev/tty...:BAUD:8E1\""
-                                                      : "\"usb:SERIAL\""));
-  if (options.driver == "modbus") {
-    options.profile = read_path(table, "profile", "", base);
-    options.station = static_cast<int>(table.integer("station", options.station, 1, 247));
-  } else {
-    options.stage = table.text("stage");
+/// Refuses an endpoint that the driver could not use.
+void check_endpoint(const TomlTable& table, const std::string& driver, const std::string& endpoint) {
+  constexpr std::string_view usb = "usb:";
+  if (driver == "modbus") {
     try {
-      apt_stage(options.stage);
+      (void)parse_modbus_endpoint(endpoint);
     } catch (const std::invalid_argument& error) {
-      table.fail("stage", error.what());
+      table.fail("endpoint", error.what());
     }
+  } else if (!endpoint.starts_with(usb) || endpoint.size() == usb.size()) {
+    table.fail("endpoint", fmt::format("\"{}\" names no device on USB; allowed: \"usb:SERIAL\"", endpoint));
   }
+}
+
+/// Unit and range. An axis that closes on itself has a range of its own.
+void read_range(const TomlTable& table, Dof& dof) {
   dof.unit = table.choice("unit", "deg", {"deg", "mm"});
   dof.periodic = table.flag("periodic", dof.unit == "deg");
   if (dof.periodic && dof.unit != "deg") table.fail("periodic", "only an axis in deg closes on itself");
@@ -142,9 +135,30 @@ AxisOptions read_axis(const TomlTable& table, const std::filesystem::path& base)
     table.fail("upper", fmt::format("{} is not above lower = {}", dof.upper, dof.lower));
   if (dof.periodic && dof.upper - dof.lower != 360.0)
     table.fail("upper", fmt::format("a periodic axis spans 360 deg, not {}", dof.upper - dof.lower));
+}
+
+AxisOptions read_axis(const TomlTable& table, const std::filesystem::path& base) {
+  AxisOptions options;
+  Dof& dof = options.dof;
+  dof.name = read_name(table, "name");
+  options.driver = table.choice("driver", std::nullopt, {"modbus", "apt"});
+  options.endpoint = table.text("endpoint");
+  if (options.endpoint != "simulated") check_endpoint(table, options.driver, options.endpoint);
+  if (options.driver == "modbus") {
+    options.profile = read_path(table, "profile", "", base);
+    options.station = static_cast<int>(table.integer("station", options.station, 1, 247));
+    if (table.has("steps_per_unit"))
+      options.steps_per_unit = table.number("steps_per_unit", std::nullopt, 1e-3, 1e7);
+  } else {
+    options.stage = table.text("stage");
+    try {
+      apt_stage(options.stage);
+    } catch (const std::invalid_argument& error) {
+      table.fail("stage", error.what());
+    }
+  }
+  read_range(table, dof);
   options.home_offset = table.number("home_offset", 0.0, -no_limit, no_limit);
-  if (table.has("steps_per_unit"))
-    options.steps_per_unit = table.number("steps_per_unit", std::nullopt, 1e-3, 1e7);
   options.reversed = table.flag("reversed", false);
   if (table.has("speed")) options.speed = table.number("speed", std::nullopt, 1e-6, 1e6);
   if (table.has("arrival_tolerance"))
@@ -159,7 +173,10 @@ LampOptions read_lamp(const TomlTable& table, const std::filesystem::path& base)
   LampOptions options;
   options.name = read_name(table, "name");
   options.driver = table.choice("driver", std::nullopt, {"dmx", "modbus", "simulated"});
-  if (options.driver != "simulated") options.endpoint = table.text("endpoint");
+  if (options.driver != "simulated") {
+    options.endpoint = table.text("endpoint");
+    check_endpoint(table, options.driver, options.endpoint);
+  }
   if (options.driver == "dmx")
     options.channel = static_cast<int>(table.integer("channel", options.channel, 1, 512));
   if (options.driver == "modbus") {
@@ -266,6 +283,7 @@ Config read(const TomlTable& root, const std::filesystem::path& file) {
   if (const auto table = root.table("sim")) config.sim = read_sim(*table);
   root.finish();
   refuse_simulated_without_lab(root, config);
+  refuse_device_conflicts(root, config);
   return config;
 }
 

@@ -1,7 +1,9 @@
 #include "config/config.h"
 
 #include <string>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -56,6 +58,157 @@ TEST(Config, AValueOutOfRangeIsRefusedWithTheRange) {
   EXPECT_THAT(refusal("[learn]\nenergy = nan\n"), HasSubstr("0.01 to 1"));
   EXPECT_THAT(refusal("[api]\nmax_connections = 0\n"), HasSubstr("1 to 1000"));
   EXPECT_THAT(refusal(axis + "station = 248\n"), HasSubstr("1 to 247"));
+}
+
+/// A table's header and the keys it needs; a key, its bounds, and the step beyond them.
+struct Bounds {
+  std::string before;
+  std::string key;
+  double lower;
+  double upper;
+  double step;
+};
+
+TEST(Config, EveryNumberIsTakenUpToBothItsBoundsAndNotBeyond) {
+  const std::string simulated = "[sim]\n[camera]\ndriver = \"simulated\"\n";
+  const std::string replay = "[sim]\n[camera]\ndriver = \"replay\"\nfolder = \"f\"\n";
+  const std::string v4l2 = "[camera]\ndriver = \"v4l2\"\n";
+  const std::string lamp = "[[lamp]]\nname = \"key\"\ndriver = \"dmx\"\nendpoint = \"usb:A\"\n";
+  const std::vector<Bounds> all = {
+      {"[api]\n", "max_connections", 1, 1000, 1},
+      {"[api]\n", "max_body_kib", 1, 16384, 1},
+      {"[api]\n", "request_timeout_ms", 100, 600'000, 1},
+      {"[api]\n", "event_buffer", 1, 100'000, 1},
+      {v4l2, "input", 0, 63, 1},
+      {v4l2, "width", 64, 8192, 1},
+      {v4l2, "height", 64, 8192, 1},
+      {v4l2, "frames_per_second", 0.1, 1000, 0.01},
+      {simulated, "exposure_ms", 0, 1000, 0.01},
+      {replay, "degrees_per_index", 0.001, 180, 0.0005},
+      {axis, "station", 1, 247, 1},
+      {axis, "steps_per_unit", 1e-3, 1e7, 5e-4},
+      {axis, "speed", 1e-6, 1e6, 5e-7},
+      {axis, "arrival_tolerance", 1e-6, 10, 5e-7},
+      {axis, "settle_ms", 0, 60'000, 1},
+      {axis, "move_timeout_ms", 100, 3'600'000, 1},
+      {axis, "home_offset", -1e9, 1e9, 1},
+      {lamp, "channel", 1, 512, 1},
+      {lamp, "level", 0, 1, 0.001},
+      {"[learn]\n", "components", 1, 1024, 1},
+      {"[learn]\n", "energy", 0.01, 1, 0.001},
+      {"[learn]\n", "size", 8, 256, 1},
+      {"[watch]\n", "settle_ms", 0, 60'000, 1},
+      {"[watch]\n", "threshold", 0.5, 255, 0.01},
+      {"[sim]\n", "seed", 0, 9e15, 1},
+      {"[sim]\n", "speed_factor", 0.01, 1000, 0.001},
+  };
+  for (const Bounds& bounds : all) {
+    const bool whole = bounds.step == 1 && bounds.key != "home_offset";
+    const auto with = [&](double value) {
+      const std::string number =
+          whole ? std::to_string(static_cast<long long>(value)) : fmt::format("{:.7f}", value);
+      return bounds.before + bounds.key + " = " + number + "\n";
+    };
+    EXPECT_EQ(refusal(with(bounds.lower)), "accepted") << bounds.key;
+    EXPECT_EQ(refusal(with(bounds.upper)), "accepted") << bounds.key;
+    EXPECT_THAT(refusal(with(bounds.lower - bounds.step)), HasSubstr(bounds.key)) << "below";
+    if (bounds.key == "seed") continue;  // up to what a whole number holds
+    EXPECT_THAT(refusal(with(bounds.upper + bounds.step)), HasSubstr(bounds.key)) << "above";
+    for (const char* no_number : {"nan", "inf", "\"1\"", "true"})
+      EXPECT_THAT(refusal(bounds.before + bounds.key + " = " + no_number + "\n"), HasSubstr(bounds.key))
+          << no_number;
+  }
+}
+
+TEST(Config, EndsOfARangeAreNumbersWithinReason) {
+  const std::string linear = axis + "periodic = false\n";
+  EXPECT_EQ(refusal(linear + "lower = -1e9\nupper = 1e9\n"), "accepted");
+  EXPECT_THAT(refusal(linear + "lower = -1.1e9\nupper = 0\n"), HasSubstr("lower"));
+  EXPECT_THAT(refusal(linear + "lower = 0\nupper = 1.1e9\n"), HasSubstr("upper"));
+  EXPECT_THAT(refusal(linear + "lower = 0\nupper = inf\n"), HasSubstr("upper"));
+}
+
+TEST(Config, AnEndpointThatCannotBeIsRefusedWithItsLine) {
+  const auto modbus = [](const std::string& endpoint) {
+    return "[[axis]]\nname = \"t\"\ndriver = \"modbus\"\nendpoint = \"" + endpoint + "\"\n";
+  };
+  for (const char* endpoint :
+       {"tcp://10.0.0.1:99999", "tcp://:502", "tcp://10.0.0.1:502/", "tcp://10.0.0.1/x", "tcp://",
+        "rtu:ttyUSB0", "rtu:/dev/ttyS0:12345", "usb:831", "Simulated"})
+    EXPECT_THAT(refusal(modbus(endpoint)), AllOf(StartsWith("rig.toml:4: "), HasSubstr("endpoint")))
+        << endpoint;
+  for (const char* endpoint : {"usb:", "usb", "tcp://10.0.0.1", ""})
+    EXPECT_THAT(
+        refusal("[[lamp]]\nname = \"l\"\ndriver = \"dmx\"\nendpoint = \"" + std::string(endpoint) + "\"\n"),
+        AllOf(StartsWith("rig.toml:4: "), HasSubstr("usb:SERIAL")))
+        << endpoint;
+  EXPECT_THAT(refusal("[[lamp]]\nname = \"l\"\ndriver = \"modbus\"\nendpoint = \"tcp://h:0\"\n"
+                      "profile = \"p\"\n"),
+              StartsWith("rig.toml:4: "));
+}
+
+std::string modbus_axis(const std::string& name, const std::string& rest) {
+  return "[[axis]]\nname = \"" + name + "\"\ndriver = \"modbus\"\n" + rest;
+}
+
+std::string apt_axis(const std::string& name, const std::string& endpoint) {
+  return "[[axis]]\nname = \"" + name + "\"\ndriver = \"apt\"\nendpoint = \"" + endpoint +
+         "\"\nstage = \"PRM1-Z8\"\n";
+}
+
+std::string dmx_lamp(const std::string& name, const std::string& endpoint, int channel) {
+  return "[[lamp]]\nname = \"" + name + "\"\ndriver = \"dmx\"\nendpoint = \"" + endpoint +
+         "\"\nchannel = " + std::to_string(channel) + "\n";
+}
+
+TEST(Config, TwoNamesOfOneDeviceAreRefusedHoweverTheyAreSpelt) {
+  const auto expect_refused = [](const std::string& text, const std::string& first,
+                                 const std::string& second) {
+    EXPECT_THAT(refusal(text), AllOf(HasSubstr("\"" + first + "\""), HasSubstr("\"" + second + "\""),
+                                     HasSubstr("would both drive")))
+        << text;
+  };
+  const auto tcp = [](const std::string& endpoint) { return "endpoint = \"" + endpoint + "\"\n"; };
+  // The station forgotten in both.
+  expect_refused(modbus_axis("a", tcp("tcp://10.0.0.1")) + modbus_axis("b", tcp("tcp://10.0.0.1")), "a", "b");
+  for (const char* other : {"tcp://10.0.0.1:502", "tcp://[::ffff:10.0.0.1]", "tcp://10.1"})
+    expect_refused(modbus_axis("a", tcp("tcp://10.0.0.1")) + modbus_axis("b", tcp(other)), "a", "b");
+  expect_refused(modbus_axis("a", tcp("tcp://LocalHost")) + modbus_axis("b", tcp("tcp://127.0.0.1:502")), "a",
+                 "b");
+  expect_refused(
+      modbus_axis("a", tcp("rtu:/dev/ttyUSB0")) + modbus_axis("b", tcp("rtu:/dev/../dev/ttyUSB0:9600:8N1")),
+      "a", "b");
+  expect_refused("[sim]\n" + modbus_axis("a", tcp("simulated") + "station = 2\n") +
+                     modbus_axis("b", tcp("simulated") + "station = 2\n"),
+                 "a", "b");
+  expect_refused(apt_axis("a", "usb:831") + apt_axis("b", "usb:831"), "a", "b");
+  expect_refused("[sim]\n" + apt_axis("a", "simulated") + apt_axis("b", "simulated"), "a", "b");
+  // A drive is no lamp.
+  expect_refused(apt_axis("a", "usb:831") + dmx_lamp("l", "usb:831", 1), "a", "l");
+  expect_refused(modbus_axis("a", tcp("tcp://h")) +
+                     "[[lamp]]\nname = \"l\"\ndriver = \"modbus\"\nprofile = \"p\"\n" + tcp("tcp://H.:502"),
+                 "a", "l");
+  // Lamps.
+  expect_refused(dmx_lamp("k", "usb:EN1", 7) + dmx_lamp("l", "usb:EN1", 7), "k", "l");
+  expect_refused(
+      "[sim]\n[[lamp]]\nname = \"k\"\ndriver = \"simulated\"\n"
+      "[[lamp]]\nname = \"l\"\ndriver = \"simulated\"\n",
+      "k", "l");
+}
+
+TEST(Config, TheLineOfTheSecondNameIsGiven) {
+  EXPECT_THAT(refusal(modbus_axis("a", "endpoint = \"tcp://h\"\nstation = 3\n") +
+                      modbus_axis("b", "endpoint = \"tcp://h\"\nstation = 3\n")),
+              StartsWith("rig.toml:10: station in [[axis]]: "));
+}
+
+TEST(Config, SeveralDevicesOnOneLineAreAccepted) {
+  const std::string endpoint = "endpoint = \"tcp://10.0.0.1\"\n";
+  EXPECT_EQ(
+      refusal(modbus_axis("a", endpoint + "station = 1\n") + modbus_axis("b", endpoint + "station = 2\n") +
+              modbus_axis("c", "endpoint = \"tcp://10.0.0.1:503\"\n") + apt_axis("d", "usb:1") +
+              apt_axis("e", "usb:2") + dmx_lamp("k", "usb:EN1", 1) + dmx_lamp("l", "usb:EN1", 2)),
+      "accepted");
 }
 
 TEST(Config, AValueOfAnotherTypeIsRefused) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -121,13 +122,43 @@ TEST(ModbusProfile, ImpossibleValuesAreRefused) {
   EXPECT_THAT(complaint(with("kind = \"drive\"", "kind = \"lamp\"")), HasSubstr("drive.toml:2: "));
   EXPECT_THAT(complaint(with("bits = 32", "bits = 24")), HasSubstr("24"));
   EXPECT_THAT(complaint(with("register = 0x20", "register = 65536")), HasSubstr("65536"));
-  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 16 }")), HasSubstr("0 to 15"));
-  EXPECT_THAT(complaint(with("bit = 1 }", "bit = -1 }")), HasSubstr("0 to 15"));
-  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 31 }")), HasSubstr("0 to 15"));
+  for (const char* bit : {"-1", "16", "31"})
+    EXPECT_THAT(complaint(with("bit = 1 }", "bit = " + std::string(bit) + " }")), HasSubstr("0 to 15"))
+        << bit;
+  for (const char* bit : {"0", "15"})
+    EXPECT_EQ(complaint(with("bit = 1 }", "bit = " + std::string(bit) + " }")), "no complaint") << bit;
+  EXPECT_THAT(complaint(with("bit = 1 }", "bit = 1, when = 2 }")), HasSubstr("0 to 1"));
   EXPECT_THAT(complaint(with("\"position:32\"", "\"position:24\"")), HasSubstr("position:24"));
   EXPECT_THAT(complaint(with("\"position:32\"", "\"positron:32\"")), HasSubstr("positron"));
   EXPECT_THAT(complaint(with("\"1:16\"", "\"65536:16\"")), HasSubstr("65536"));
   EXPECT_THAT(complaint(with("\"1:16\"", "\"1\"")), HasSubstr("WHAT:BITS"));
+}
+
+TEST(ModbusProfile, EveryNumberIsTakenUpToBothItsBoundsAndNotBeyond) {
+  const auto with_line = [](const std::string& table, const std::string& line) {
+    return with("[position]\n", table + line + "[position]\n");
+  };
+  const std::string serial = "[serial]\nparity = \"even\"\n";
+  struct Bounds {
+    std::string table, key, lower, upper, below, above;
+  };
+  for (const Bounds& b : std::vector<Bounds>{
+           {serial + "stop_bits = 1\n", "baud", "1200", "4000000", "1199", "4000001"},
+           {serial + "baud = 9600\n", "stop_bits", "1", "2", "0", "3"},
+           {serial + "baud = 9600\nstop_bits = 1\n", "silent_interval_ms", "0", "1000", "-1", "1001"},
+           {"[defaults]\n", "steps_per_unit", "0.001", "1e7", "0.0009", "1.1e7"},
+           {"[defaults]\n", "speed", "1e-6", "1e6", "9e-7", "1.1e6"},
+           {"[defaults]\n", "acceleration", "1e-6", "1e9", "9e-7", "1.1e9"},
+           {"[defaults]\n", "arrival_tolerance", "0.0", "1e3", "-0.001", "1000.1"},
+           {"[defaults]\n", "watchdog_ms", "0", "10000", "-1", "10001"}}) {
+    EXPECT_EQ(complaint(with_line(b.table, b.key + " = " + b.lower + "\n")), "no complaint") << b.key;
+    EXPECT_EQ(complaint(with_line(b.table, b.key + " = " + b.upper + "\n")), "no complaint") << b.key;
+    EXPECT_THAT(complaint(with_line(b.table, b.key + " = " + b.below + "\n")), HasSubstr(b.key)) << "below";
+    EXPECT_THAT(complaint(with_line(b.table, b.key + " = " + b.above + "\n")), HasSubstr(b.key)) << "above";
+  }
+  EXPECT_THAT(complaint(with("bits = 32\n", "bits = 32\nhome_steps = 2147483648\n")),
+              HasSubstr("home_steps"));
+  EXPECT_EQ(complaint(with("bits = 32\n", "bits = 32\nhome_steps = -2147483648\n")), "no complaint");
 }
 
 TEST(ModbusProfile, WhatWouldBeDangerousIsRefused) {
