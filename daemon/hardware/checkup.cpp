@@ -218,6 +218,13 @@ void check_picture(const Frame& frame, const Report& report) {
   }
 }
 
+/// A failure in words, without the device's name, which is the finding's subject.
+std::string words_of(const DeviceError& error) {
+  const std::string words = error.what();
+  const std::string name = error.device() + ": ";
+  return words.starts_with(name) ? words.substr(name.size()) : words;
+}
+
 void check_camera(const Devices& devices, const Clock& clock, const std::stop_token& stop,
                   const Report& report) {
   const std::unique_ptr<Camera> camera = devices.camera();
@@ -230,7 +237,16 @@ void check_camera(const Devices& devices, const Clock& clock, const std::stop_to
           {}});
   constexpr int frames = 10;
   Frame frame;
-  for (int i = 0; i < frames; ++i) frame = camera->next_frame(clock.now() + seconds(5), stop);
+  try {
+    for (int i = 0; i < frames; ++i) frame = camera->next_frame(clock.now() + seconds(5), stop);
+  } catch (const DeviceTimeout& timeout) {
+    const std::uint64_t damaged = camera->statistics().frames_damaged;
+    report({Health::fault, "camera", words_of(timeout),
+            damaged > 0 ? "try another cable or USB port, or another format in [camera]"
+                        : "see that nothing else uses the camera, that its trigger is off, and that its USB "
+                          "port has the bandwidth for this size and rate"});
+    return;
+  }
   const CameraStatistics counts = camera->statistics();
   if (counts.frames_damaged > 0) {
     report(
@@ -268,13 +284,6 @@ void check_lamp(const RigLamp& lamp, const Clock& clock, const Report& report) {
   report({Health::good, "lamp " + lamp.options.name, opened->info().model + " answers", {}});
 }
 
-/// A failure in words, without the device's name, which is the finding's subject.
-std::string words_of(const DeviceError& error) {
-  const std::string words = error.what();
-  const std::string name = error.device() + ": ";
-  return words.starts_with(name) ? words.substr(name.size()) : words;
-}
-
 /// Runs one check; a failing device is a finding, not the end.
 template <class Check>
 void guarded(const std::string& subject, const std::stop_token& stop, const Report& report,
@@ -289,7 +298,7 @@ void guarded(const std::string& subject, const std::stop_token& stop, const Repo
             "see that it is plugged in, switched on, and named rightly in the configuration"});
   } catch (const DeviceTimeout& timeout) {
     report({Health::fault, subject, words_of(timeout),
-            "see that it is switched on, and that address and line settings are the drive's"});
+            "see that it is switched on, and that address and line settings are the device's"});
   } catch (const std::exception& error) {
     report({Health::fault, subject, error.what(),
             "see that the configuration describes this device: endpoint, station, profile, controls"});

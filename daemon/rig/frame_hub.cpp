@@ -120,6 +120,10 @@ void FrameHub::run(const std::stop_token& stop) {
     } catch (const Interrupted&) {
       return;
     } catch (const std::exception&) {
+      if (camera) {
+        const std::lock_guard lock(mutex_);
+        status_.statistics = camera->statistics();  // it may fail because every frame is damaged
+      }
       report_trouble(std::current_exception());
       clock_.sleep_for(retry_pause, stop);
     }

@@ -326,6 +326,36 @@ TEST_F(CheckupTest, AFailingDeviceIsAFindingAndTheOthersAreStillAsked) {
   EXPECT_EQ(moves, 0);
 }
 
+/// A camera that never gives a picture.
+class BlindCamera final : public Camera {
+ public:
+  explicit BlindCamera(std::uint64_t damaged) : damaged_(damaged) {}
+  [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  Frame next_frame(TimePoint, std::stop_token) override {
+    throw DeviceTimeout("camera", "waiting for a frame", "none came in time");
+  }
+  [[nodiscard]] CameraStatistics statistics() const override { return {.frames_damaged = damaged_}; }
+
+ private:
+  std::uint64_t damaged_;
+  CameraInfo info_;
+};
+
+TEST_F(CheckupTest, ACameraWithoutAPictureIsToldFromADriveAndADamagedOneFromASilentOne) {
+  for (const std::uint64_t damaged : {std::uint64_t{0}, std::uint64_t{40}}) {
+    Devices devices;
+    devices.camera = [damaged] { return std::make_unique<BlindCamera>(damaged); };
+    std::vector<Finding> all;
+    const SteadyClock clock;
+    check_devices(devices, clock, {}, [&](const Finding& finding) { all.push_back(finding); });
+    ASSERT_EQ(all.size(), 2U);
+    EXPECT_EQ(all[1].health, Health::fault);
+    EXPECT_EQ(all[1].subject, "camera");
+    EXPECT_THAT(all[1].remedy, testing::Not(HasSubstr("drive")));
+    EXPECT_THAT(all[1].remedy, HasSubstr(damaged > 0 ? "another cable" : "trigger"));
+  }
+}
+
 TEST_F(CheckupTest, TellsAnAlarmInTheDrivesWords) {
   AxisState state{0.0, false, true, "overload"};
   int moves = 0;
