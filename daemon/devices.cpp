@@ -25,6 +25,7 @@
 #include "sim/lab/sim_lab.h"
 #include "sim/lab/sim_lamp.h"
 #include "sim/modbus/modbus_server.h"
+#include "sim/modbus/pdu_server.h"
 #include "sim/usb/apt_controller.h"
 #include "sim/usb/sim_link.h"
 #endif
@@ -35,35 +36,45 @@ namespace {
 #ifdef EIGENPOSE_SIM
 /// The simulated lab with its drives and its control, in the order they depend on each other.
 struct SimulatedLab {
-  SimulatedLab(const SimOptions& options, const std::filesystem::path& socket, const Clock& clock)
-      : lab(clock, {.seed = options.seed}),
-        drives(lab, {.speed_factor = options.speed_factor}),
-        control(lab, socket, &drives) {}
+  SimulatedLab(const SimOptions& options, const Clock& clock) : lab(clock, {.seed = options.seed}) {}
+  /// Opens the drives' port and the control socket.
+  void start(const SimOptions& options, const std::filesystem::path& socket) {
+    drives = std::make_unique<sim::SimModbusServer>(
+        lab, sim::SimModbusServerOptions{.speed_factor = options.speed_factor});
+    control = std::make_unique<sim::LabServer>(lab, socket, drives.get());
+  }
   sim::SimLab lab;
-  sim::SimModbusServer drives;
-  sim::LabServer control;
+  std::unique_ptr<sim::SimModbusServer> drives;
+  std::unique_ptr<sim::LabServer> control;
 };
 #else
 struct SimulatedLab;
 #endif
 
-/// What the constructors below share while a configuration is turned into devices.
+/// What the makers below share while a configuration is turned into devices.
 struct Workbench {
   const Config& config;
   const Clock& clock;
   std::shared_ptr<SimulatedLab> lab;  ///< null without [sim]
   std::optional<SimulationInfo> simulation;
-  std::map<std::string, std::shared_ptr<ModbusBus>> buses;  ///< by endpoint: devices on one line share it
+  std::map<std::string, std::shared_ptr<ModbusBus>> buses;          ///< by line: devices on one line share it
+  std::map<std::string, std::shared_ptr<EnttecDmxWidget>> widgets;  ///< by USB serial number: likewise
 
+  /// @throws std::invalid_argument when two devices want one serial line set in different ways.
   std::shared_ptr<ModbusBus> bus(const std::string& endpoint, const SerialDefaults& serial) {
-    std::shared_ptr<ModbusBus>& found = buses[endpoint];
-    if (!found) {
-      ModbusBusOptions options;
-      const bool simulated = endpoint == "simulated" && simulation;
-      options.endpoint = parse_modbus_endpoint(
-          simulated ? fmt::format("tcp://127.0.0.1:{}", simulation->modbus_port) : endpoint, serial);
-      found = std::make_shared<ModbusBus>(std::move(options), clock);
-    }
+    ModbusBusOptions options;
+    const bool simulated = endpoint == "simulated" && simulation;
+    options.endpoint = parse_modbus_endpoint(
+        simulated ? fmt::format("tcp://127.0.0.1:{}", simulation->modbus_port) : endpoint, serial);
+    std::shared_ptr<ModbusBus>& found = buses[line_name(options.endpoint)];
+    auto wanted = std::make_shared<ModbusBus>(std::move(options), clock);
+    if (!found) found = wanted;
+    const bool serial_line = endpoint.starts_with("rtu:");
+    if (serial_line && found->description() != wanted->description())
+      throw std::invalid_argument(
+          fmt::format("one line cannot be set in two ways: {}, and {} for another "
+                      "device; give baud rate and frame in each endpoint",
+                      wanted->description(), found->description()));
     return found;
   }
 };
@@ -112,6 +123,19 @@ FrameHub::OpenCamera replay_camera(const CameraOptions& camera, Workbench& bench
 
 // Axes ---------------------------------------------------------------------------------------------------
 
+/// @throws std::invalid_argument when the simulated lab has no drive there.
+void check_simulated_station([[maybe_unused]] int station) {
+#ifdef EIGENPOSE_SIM
+  std::string known;
+  for (const sim::DriveOptions& drive : sim::default_drives()) {
+    if (drive.unit == station) return;
+    known += (known.empty() ? "" : ", ") + std::to_string(drive.unit);
+  }
+  throw std::invalid_argument(
+      fmt::format("the simulated lab has no drive at station {}; it has: {}", station, known));
+#endif
+}
+
 std::function<std::unique_ptr<Axis>()> modbus_axis(const AxisOptions& axis, Workbench& bench) {
   ModbusProfile profile =
       axis.profile.empty() ? oriental_motor_az_profile() : read_modbus_profile(axis.profile);
@@ -127,6 +151,7 @@ std::function<std::unique_ptr<Axis>()> modbus_axis(const AxisOptions& axis, Work
   options.acceleration = defaults.acceleration;
   options.arrival_tolerance = axis.arrival_tolerance.value_or(defaults.arrival_tolerance);
   options.watchdog = defaults.watchdog;
+  if (axis.endpoint == "simulated") check_simulated_station(axis.station);
   std::shared_ptr<ModbusBus> bus = bench.bus(axis.endpoint, profile.serial);
   return [profile = std::move(profile), options, bus = std::move(bus), &clock = bench.clock] {
     return std::make_unique<ModbusAxis>(profile, options, bus, clock);
@@ -209,14 +234,19 @@ std::function<std::unique_ptr<Lamp>()> simulated_lamp(const LampOptions& lamp, W
 #endif
 
 std::function<std::unique_ptr<Lamp>()> dmx_lamp(const LampOptions& lamp, Workbench& bench) {
-  FtdiLinkOptions link;
-  link.serial = usb_serial(lamp.endpoint);
-  link.baud = 57600;
+  std::shared_ptr<EnttecDmxWidget>& widget = bench.widgets[usb_serial(lamp.endpoint)];
+  if (!widget) {
+    FtdiLinkOptions link;
+    link.serial = usb_serial(lamp.endpoint);
+    link.baud = 57600;
+    widget = std::make_shared<EnttecDmxWidget>(EnttecDmxWidgetOptions{},
+                                               std::make_unique<FtdiLink>(link, bench.clock), bench.clock);
+  }
   EnttecDmxLampOptions options;
   options.name = lamp.name;
   options.channels = {{lamp.channel, 1.0}};
-  return [options, link, &clock = bench.clock] {
-    return std::make_unique<EnttecDmxLamp>(options, std::make_unique<FtdiLink>(link, clock), clock);
+  return [options, widget, &clock = bench.clock] {
+    return std::make_unique<EnttecDmxLamp>(options, widget, clock);
   };
 }
 
@@ -260,24 +290,47 @@ auto look_up(const Table& table, const std::string& driver, const std::string& n
   }
 }
 
-void start_lab(Workbench& bench) {
+/// Two ways to the one simulated arm: its Modbus drive, and its APT controller.
+void refuse_simulated_arm_twice([[maybe_unused]] const Config& config) {
 #ifdef EIGENPOSE_SIM
-  bench.lab = std::make_shared<SimulatedLab>(*bench.config.sim, bench.config.lab_socket(), bench.clock);
-  bench.simulation = SimulationInfo{bench.config.lab_socket(), bench.lab->drives.port()};
-  spdlog::info("event=simulated_lab control={} modbus_port={}", bench.simulation->lab_socket.string(),
-               bench.simulation->modbus_port);
-#else
-  throw ConfigError(bench.config.file.string() +
-                    ": [sim]: this eigenposed was built without the simulated lab");
+  std::string modbus;
+  std::string apt;
+  for (const AxisOptions& axis : config.axes) {
+    if (axis.endpoint != "simulated") continue;
+    if (axis.driver == "apt") apt = axis.dof.name;
+    for (const sim::DriveOptions& drive : sim::default_drives())
+      if (axis.driver == "modbus" && drive.unit == axis.station && drive.axis == sim::LabAxis::arm_azimuth)
+        modbus = axis.dof.name;
+  }
+  if (!modbus.empty() && !apt.empty())
+    throw ConfigError(fmt::format(
+        "{}: axis \"{}\" and axis \"{}\" would both turn the simulated light arm; leave one of them out",
+        config.file.string(), modbus, apt));
 #endif
 }
 
-}  // namespace
+std::shared_ptr<SimulatedLab> make_lab([[maybe_unused]] const Config& config,
+                                       [[maybe_unused]] const Clock& clock) {
+#ifdef EIGENPOSE_SIM
+  return std::make_shared<SimulatedLab>(*config.sim, clock);
+#else
+  throw ConfigError(config.file.string() + ": [sim]: this eigenposed was built without the simulated lab");
+#endif
+}
 
-Devices make_devices(const Config& config, const Clock& clock) {
+void start_lab([[maybe_unused]] Workbench& bench) {
+#ifdef EIGENPOSE_SIM
+  bench.lab->start(*bench.config.sim, bench.config.lab_socket());
+  bench.simulation = SimulationInfo{bench.config.lab_socket(), bench.lab->drives->port()};
+  spdlog::info("event=simulated_lab control={} modbus_port={}", bench.simulation->lab_socket.string(),
+               bench.simulation->modbus_port);
+#endif
+}
+
+Devices devices_on(Workbench& bench) {
+  const Config& config = bench.config;
+  refuse_simulated_arm_twice(config);
   Devices devices;
-  Workbench bench{config, clock, nullptr, std::nullopt, {}};
-  if (config.sim) start_lab(bench);
   if (config.camera)
     devices.camera = look_up(cameras, config.camera->driver, config.camera->name, *config.camera, bench);
   for (const AxisOptions& axis : config.axes)
@@ -288,6 +341,39 @@ Devices make_devices(const Config& config, const Clock& clock) {
   devices.lab = bench.lab;
   devices.simulation = bench.simulation;
   return devices;
+}
+
+}  // namespace
+
+Devices make_devices(const Config& config, const Clock& clock) {
+  Workbench bench{config, clock, nullptr, std::nullopt, {}, {}};
+  if (config.sim) {
+    bench.lab = make_lab(config, clock);
+    start_lab(bench);
+  }
+  return devices_on(bench);
+}
+
+void check_device_options(const Config& config) {
+  const SteadyClock clock;
+  Workbench bench{config, clock, nullptr, std::nullopt, {}, {}};
+  if (config.sim) {
+    bench.lab = make_lab(config, clock);
+    bench.simulation = SimulationInfo{config.lab_socket(), 502};  // any port: nobody connects
+  }
+  const Devices devices = devices_on(bench);
+  // A driver checks its options when it is made, and touches its device only later; but a real camera is
+  // opened at once.
+  const auto check = [&](const std::string& name, const auto& make) {
+    try {
+      (void)make();
+    } catch (const std::invalid_argument& error) {
+      throw ConfigError(fmt::format("{}: \"{}\": {}", config.file.string(), name, error.what()));
+    }
+  };
+  if (config.camera && config.camera->driver != "v4l2") check(config.camera->name, devices.camera);
+  for (const RigAxis& axis : devices.axes) check(axis.options.dof.name, axis.open);
+  for (const RigLamp& lamp : devices.lamps) check(lamp.options.name, lamp.open);
 }
 
 }  // namespace eigenpose

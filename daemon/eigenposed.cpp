@@ -20,6 +20,7 @@
 #include "daemon/api/server.h"
 #include "daemon/api/unix_socket.h"
 #include "daemon/composition.h"
+#include "daemon/config_check.h"
 #include "daemon/devices.h"
 #include "daemon/manual/man_page.h"
 #include "daemon/service/service.h"
@@ -89,6 +90,7 @@ void run(const Options& options) {
     config.daemon.runtime_dir = std::filesystem::absolute(options.runtime_dir);
   if (!options.state_dir.empty()) config.daemon.state_dir = std::filesystem::absolute(options.state_dir);
   const ServiceOptions work = service_options(config);
+  check_config(config);
   if (options.check_only) {
     std::printf("%s: good\n", options.config.c_str());
     return;

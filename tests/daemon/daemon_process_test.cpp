@@ -9,59 +9,23 @@
 #include <utility>
 #include <vector>
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include "core/base/clock.h"
 #include "daemon/api/client/api_client.h"
 #include "sim/lab/lab_client.h"
 #include "sim/lab/sim_lab.h"
 #include "sim/modbus/modbus_server.h"
+#include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
-
-extern char** environ;
 
 namespace eigenpose {
 namespace {
 
+using test::Program;
 using testing::HasSubstr;
-
-/// A program under way, its stderr in a file. Killed if the test gives up.
-class Program {
- public:
-  Program(std::vector<std::string> arguments, const std::filesystem::path& log,
-          const std::string& program = EIGENPOSED) {
-    arguments.insert(arguments.begin(), program);
-    std::vector<char*> pointers;
-    for (std::string& argument : arguments) pointers.push_back(argument.data());
-    pointers.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    EXPECT_EQ(posix_spawn(&process_, program.c_str(), &actions, nullptr, pointers.data(), environ), 0);
-    posix_spawn_file_actions_destroy(&actions);
-  }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
-  ~Program() {
-    if (process_ > 0) ::kill(process_, SIGKILL);
-    if (process_ > 0) wait();
-  }
-  void signal(int number) const { ::kill(process_, number); }
-  int wait() {
-    int status = 0;
-    ::waitpid(process_, &status, 0);
-    process_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
-
- private:
-  pid_t process_ = -1;
-};
 
 class DaemonProcess : public testing::Test {
  protected:
@@ -93,7 +57,7 @@ class DaemonProcess : public testing::Test {
 };
 
 TEST_F(DaemonProcess, StopsCleanlyInTheMiddleOfAnAcquisition) {
-  Program daemon(arguments(), log_);
+  Program daemon(EIGENPOSED, arguments(), log_);
   const nlohmann::json status = status_once_ready();
   EXPECT_EQ(status.at("program"), "eigenposed");
   {
@@ -114,10 +78,10 @@ TEST_F(DaemonProcess, StopsCleanlyInTheMiddleOfAnAcquisition) {
 }
 
 TEST_F(DaemonProcess, ASecondOneIsRefusedAndTheFirstGoesOn) {
-  Program first(arguments(), log_);
+  Program first(EIGENPOSED, arguments(), log_);
   status_once_ready();
   const std::filesystem::path second_log = folder_.path() / "second";
-  Program second(arguments(), second_log);
+  Program second(EIGENPOSED, arguments(), second_log);
   EXPECT_EQ(second.wait(), 1);
   EXPECT_THAT(text_of(second_log), HasSubstr("another eigenposed answers on this socket: stop it first"));
   EXPECT_NO_THROW(status_once_ready());
@@ -138,7 +102,7 @@ class DrivenByHand : public DaemonProcess {
     command.insert(command.end(),
                    {"--config", rig_.string(), "--runtime-dir", (folder_.path() / runtime_dir).string()});
     const std::filesystem::path words = folder_.path() / "words";
-    Program program(std::move(command), words, EIGENPOSE);
+    Program program(EIGENPOSE, std::move(command), words);
     const int code = program.wait();
     return {code, text_of(words)};
   }
@@ -151,7 +115,7 @@ class DrivenByHand : public DaemonProcess {
 };
 
 TEST_F(DrivenByHand, NothingMovesWhileTheServiceHoldsTheRig) {
-  Program daemon({"--config", rig_.string()}, log_);
+  Program daemon(EIGENPOSED, {"--config", rig_.string()}, log_);
   while (status_once_ready().at("axes").at(0).at("position").is_null()) std::this_thread::yield();
   const double before = table_deg();
   const std::vector<std::vector<std::string>> commands = {
@@ -181,28 +145,98 @@ TEST_F(DrivenByHand, NothingMovesWhileTheServiceHoldsTheRig) {
 
 TEST_F(DaemonProcess, ReplacesTheSocketsOfOneThatWasKilled) {
   {
-    Program killed(arguments(), log_);
+    Program killed(EIGENPOSED, arguments(), log_);
     status_once_ready();
     killed.signal(SIGKILL);
     killed.wait();
   }
   ASSERT_TRUE(std::filesystem::exists(run_ / "control.sock"));
-  Program next(arguments(), log_);
+  Program next(EIGENPOSED, arguments(), log_);
   EXPECT_EQ(status_once_ready().at("program"), "eigenposed");
 }
 
 TEST_F(DaemonProcess, AnUnknownKeyStopsItBeforeAnythingIsOpened) {
   const std::filesystem::path file = folder_.path() / "rig.toml";
   std::ofstream(file) << "[daemon]\nruntme_dir = \"x\"\n";
-  Program daemon({"--config", file.string(), "--runtime-dir", run_.string()}, log_);
+  Program daemon(EIGENPOSED, {"--config", file.string(), "--runtime-dir", run_.string()}, log_);
   EXPECT_EQ(daemon.wait(), 1);
   EXPECT_THAT(log(),
               HasSubstr("rig.toml:2: unknown key \"runtme_dir\" in [daemon], did you mean \"runtime_dir\"?"));
   EXPECT_FALSE(std::filesystem::exists(run_));
 }
 
+/// A configuration, and what is said of it before anything is opened.
+struct Misconfiguration {
+  std::string text;
+  std::string complaint;
+};
+
+TEST_F(DaemonProcess, TheCheckRefusesWhatTheStartWouldRefuse) {
+  const std::string sim = "[sim]\n";
+  const std::string modbus = "[[axis]]\nname = \"t\"\ndriver = \"modbus\"\nendpoint = ";
+  const std::string lamp = "[[lamp]]\nname = \"key\"\n";
+  const std::string camera = sim + "[camera]\ndriver = \"simulated\"\n";
+  const std::vector<Misconfiguration> all = {
+      {modbus + "\"tcp://10.0.0.1:99999\"\n", "the port is above 65535"},
+      {modbus + "\"tcp://:502\"\n", "no host"},
+      {modbus + "\"tcp://10.0.0.1:502/\"\n", "is no port"},
+      {modbus + "\"tcp://10.0.0.1\"\nprofile = \"nope.toml\"\n", "nope.toml"},
+      {modbus + "\"tcp://10.0.0.1\"\nprofile = \"rig.toml\"\n", "rig.toml:"},
+      {sim + modbus + "\"simulated\"\nstation = 9\n", "no drive at station 9"},
+      {modbus + "\"rtu:/dev/ttyS0:9600:8N1\"\n[[axis]]\nname = \"u\"\ndriver = \"modbus\"\nstation = 2\n"
+                "endpoint = \"rtu:/dev/ttyS0:19200:8N1\"\n",
+       "one line cannot be set in two ways"},
+      {sim + modbus +
+           "\"simulated\"\nstation = 2\n[[axis]]\nname = \"u\"\ndriver = \"apt\"\n"
+           "endpoint = \"simulated\"\nstage = \"PRM1-Z8\"\n",
+       "both turn the simulated light arm"},
+      {sim + "[[axis]]\nname = \"u\"\ndriver = \"apt\"\nendpoint = \"simulated\"\nstage = \"MTS50-Z8\"\n"
+             "unit = \"mm\"\nlower = 0\nupper = 50\n",
+       "moves in mm"},
+      {"[[axis]]\nname = \"u\"\ndriver = \"apt\"\nendpoint = \"usb:1\"\nstage = \"MTS50-Z8\"\n",
+       "moves in mm, the axis in deg"},
+      {lamp + "driver = \"modbus\"\nendpoint = \"tcp://h\"\nprofile = \"nope.toml\"\n", "nope.toml"},
+      {"[learn]\ntype = \"greyish\"\n", "greyish"},
+      {sim + "[camera]\ndriver = \"replay\"\nfolder = \"nope\"\n", "nope"},
+      {camera + "width = 641\n", "641"},
+      {camera + "height = 8000\n", "8000"},
+      {camera + "exposure_ms = 100\n", "exposure"},
+      {"[daemon]\nruntime_dir = \"" + std::string(100, 'x') + "\"\n", "choose a shorter folder"},
+      {"[api]\ncontrol_group = \"no-such-group\"\n", "no group \"no-such-group\""},
+      {"[api]\nresults_group = \"no-such-group\"\n", "no group \"no-such-group\""},
+  };
+  const std::filesystem::path file = folder_.path() / "rig.toml";
+  for (const Misconfiguration& wrong : all) {
+    std::ofstream(file) << wrong.text;
+    for (const bool check : {true, false}) {
+      std::vector<std::string> arguments = {"--config", file.string(), "--state-dir", state_.string()};
+      if (check) arguments.emplace_back("--check-config");
+      Program daemon(EIGENPOSED, arguments, log_);
+      EXPECT_EQ(daemon.wait(), 1) << wrong.text;
+      EXPECT_THAT(log(), HasSubstr(wrong.complaint)) << wrong.text;
+      EXPECT_FALSE(std::filesystem::exists(state_)) << "something was opened";
+    }
+  }
+}
+
+TEST_F(DaemonProcess, TheCheckAcceptsEveryShippedRigAndOpensNothing) {
+  const std::filesystem::path rigs = std::filesystem::path(EIGENPOSE_SOURCE_DIR) / "config" / "rigs";
+  int checked = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(rigs)) {
+    if (entry.path().filename() == "replay.toml") continue;  // shows a folder that a user has to bring
+    Program check(EIGENPOSED,
+                  {"--check-config", "--config", entry.path().string(), "--runtime-dir", run_.string(),
+                   "--state-dir", state_.string()},
+                  log_);
+    EXPECT_EQ(check.wait(), 0) << log();
+    EXPECT_FALSE(std::filesystem::exists(run_)) << entry.path();
+    ++checked;
+  }
+  EXPECT_GE(checked, 3);
+}
+
 TEST_F(DaemonProcess, CommandsNeedTheControlSocket) {
-  Program daemon(arguments(), log_);
+  Program daemon(EIGENPOSED, arguments(), log_);
   status_once_ready();
   try {
     ApiClient(run_ / "results.sock").post("/v1/learn", nlohmann::json::object());
