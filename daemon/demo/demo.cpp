@@ -44,13 +44,15 @@ struct Placement {
   Angle yaw;
   double x_mm = 0.0;
   double y_mm = 0.0;
-  bool stranger = false;
+  bool unknown = false;  ///< was never learned
+  bool by_hand = false;  ///< a hand puts it down, instead of it being there at once
 };
 
 struct Tally {
   unsigned known = 0, known_right = 0;
-  unsigned strangers = 0, strangers_right = 0;
+  unsigned unknown = 0, unknown_right = 0;
   unsigned empty = 0, empty_right = 0;
+  unsigned by_hand = 0, hand_wrong = 0;  ///< placements with a hand, and wrong results while it was there
   std::vector<double> pose_errors_deg;
   std::vector<std::string> without_pose;  ///< objects left out of the pose error, by name
 };
@@ -71,14 +73,22 @@ void wait_for_daemon(ApiClient& api) {
   }
 }
 
-/// The catalogue in a fresh random order: what is learned, and what stays strange.
-void choose_objects(const std::vector<sim::CatalogEntry>& catalogue, unsigned count, std::mt19937& random,
-                    std::vector<std::string>& learned, std::vector<std::string>& strangers) {
-  for (const auto& object : catalogue) (object.stranger ? strangers : learned).push_back(object.name);
-  std::shuffle(learned.begin(), learned.end(), random);
-  if (learned.size() > count) learned.resize(count);
-  if (learned.empty() || strangers.empty())
-    throw Error("the lab's catalogue needs objects to learn and strangers; it has too few");
+/// What is learned, and what stays unknown.
+struct Choice {
+  std::vector<std::string> learned;
+  std::vector<std::string> unknown;
+};
+
+/// The catalogue in a fresh random order.
+Choice choose_objects(const std::vector<sim::CatalogEntry>& catalogue, unsigned count, std::mt19937& random) {
+  Choice choice;
+  for (const auto& object : catalogue)
+    (object.held_out ? choice.unknown : choice.learned).push_back(object.name);
+  std::shuffle(choice.learned.begin(), choice.learned.end(), random);
+  if (choice.learned.size() > count) choice.learned.resize(count);
+  if (choice.learned.empty() || choice.unknown.empty())
+    throw Error("the lab's catalogue needs objects to learn and objects to leave out; it has too few");
+  return choice;
 }
 
 void acquire(ApiClient& api, sim::LabClient& lab, const std::vector<std::string>& objects) {
@@ -109,21 +119,21 @@ void learn(ApiClient& api) {
               model.value("views", 0), model.value("components", 0), seconds);
 }
 
-std::vector<Placement> plan(const Options& options, const std::vector<std::string>& learned,
-                            const std::vector<std::string>& strangers, std::mt19937& random) {
+std::vector<Placement> plan(const Options& options, const Choice& choice, std::mt19937& random) {
   std::uniform_real_distribution<double> yaw(0.0, 360.0);
   std::uniform_real_distribution<double> offset(-10.0, 10.0);
   std::vector<Placement> placements;
   for (unsigned i = 0; i < options.placements; ++i) {
     Placement placement;
-    // One placement in nine is a stranger, one in twelve an empty table; the others go round the learned
-    // objects.
+    // One placement in nine is an unknown object, one in twelve an empty table; the others go round the
+    // learned objects. A hand brings one in four.
     if (i % 9 == 4) {
-      placement.stranger = true;
-      placement.object = strangers[(i / 9) % strangers.size()];
+      placement.unknown = true;
+      placement.object = choice.unknown[(i / 9) % choice.unknown.size()];
     } else if (i % 12 != 7) {
-      placement.object = learned[i % learned.size()];
+      placement.object = choice.learned[i % choice.learned.size()];
     }
+    placement.by_hand = i % 4 == 2 && !placement.object.empty();
     placement.yaw = degrees(yaw(random));
     placement.x_mm = offset(random);
     placement.y_mm = offset(random);
@@ -166,65 +176,107 @@ bool is_observable(const json& objects, const std::string& name) {
   return true;
 }
 
+/// How many regions of `result` are recognised as something else than `object`.
+unsigned wrong_names(const json& result, const std::string& object) {
+  unsigned wrong = 0;
+  for (const json& outcome : result.value("outcomes", json::array()))
+    wrong += outcome.at("verdict") == "recognized" && outcome.at("object") != object;
+  return wrong;
+}
+
+/// Has a hand put the object down, and looks at every result until it has left the picture.
+/// @return since when the picture is free of it, monotonic seconds.
+double place_by_hand(ApiClient& api, sim::LabClient& lab, const Placement& placement, Tally& tally) {
+  const double begin = monotonic_seconds();
+  lab.place(placement.object, placement.yaw, placement.x_mm, placement.y_mm, true);
+  ++tally.by_hand;
+  double last_seen = begin;
+  std::uint64_t sequence = 0;
+  for (;;) {
+    const double now = monotonic_seconds();
+    const sim::Truth truth = lab.truth();
+    if (!truth.hand_in_view && !truth.moving) return last_seen;
+    last_seen = now;
+    const json result = latest_result(api);
+    const auto number = result.value("sequence", std::uint64_t{0});
+    if (number != sequence && result.value("exposure_monotonic_s", 0.0) > begin)
+      tally.hand_wrong += wrong_names(result, placement.unknown ? "" : placement.object);
+    sequence = number;
+    SteadyClock().sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+/// What the daemon says in one word.
+std::string word_of(const json& outcomes) {
+  if (outcomes.empty()) return "nothing";
+  if (outcomes.size() > 1) return std::to_string(outcomes.size()) + " things";
+  const bool recognized = outcomes[0].at("verdict") == "recognized";
+  return (recognized ? outcomes[0].at("object") : outcomes[0].at("verdict")).get<std::string>();
+}
+
+/// A line of the table. A degree sign is two bytes and one column wide.
+void print_line(unsigned number, const std::string& placed, const std::string& truth, const std::string& said,
+                const std::string& found, bool right) {
+  const auto padded = [](const std::string& text) {
+    const bool has_degree = text.find("\u00b0") != std::string::npos;
+    return std::string(text.size() < 9 ? 8 - text.size() + (has_degree ? 1 : 0) : 0, ' ') + text;
+  };
+  std::printf("  %3u  %-15s %s   %-14s %s  %s\n", number, placed.c_str(), padded(truth).c_str(), said.c_str(),
+              found.c_str(), mark(right));
+  std::fflush(stdout);
+}
+
+std::string degree_text(const char* format, double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+/// Pose and error of a known object, as two columns; counts them.
+std::string judge_pose(const json& outcome, const Placement& placement, const json& objects, Tally& tally) {
+  if (!is_observable(objects, placement.object)) {
+    auto& names = tally.without_pose;
+    if (std::find(names.begin(), names.end(), placement.object) == names.end())
+      names.push_back(placement.object);
+    return "     any         ";
+  }
+  const Angle seen = degrees(outcome.at("q").at(0).get<double>());
+  const double error = std::abs(circular_difference(seen, placement.yaw).degrees());
+  tally.pose_errors_deg.push_back(error);
+  return degree_text("%7.1f\u00b0", seen.degrees()) + " " + degree_text("%7.2f\u00b0", error);
+}
+
 /// Puts one thing on the table, asks what it is, prints the answer beside the truth, counts it.
 void show(ApiClient& api, sim::LabClient& lab, const Placement& placement, unsigned number,
           const json& objects, Tally& tally) {
   lab.clear();
-  if (!placement.object.empty()) lab.place(placement.object, placement.yaw, placement.x_mm, placement.y_mm);
-  const json result = settled_result(api, monotonic_seconds());
+  double since = monotonic_seconds();
+  if (placement.by_hand) {
+    since = place_by_hand(api, lab, placement, tally);
+  } else if (!placement.object.empty()) {
+    lab.place(placement.object, placement.yaw, placement.x_mm, placement.y_mm);
+    since = monotonic_seconds();
+  }
+  const json result = settled_result(api, since);
   const json& outcomes = result.at("outcomes");
-
-  std::string said = "nothing";
-  std::string detail;
-  bool right = false;
-  if (outcomes.size() > 1) {
-    said = std::to_string(outcomes.size()) + " things";
-  } else if (outcomes.size() == 1) {
-    const json& outcome = outcomes[0];
-    const bool recognized = outcome.at("verdict") == "recognized";
-    said = recognized ? outcome.at("object").get<std::string>() : outcome.at("verdict").get<std::string>();
-  }
-
+  const std::string said = word_of(outcomes);
+  const std::string nothing(17, ' ');
   if (placement.object.empty()) {
+    const bool right = outcomes.empty();
     ++tally.empty;
-    right = outcomes.empty();
     tally.empty_right += right;
-    std::printf("  %3u  %-14s %8s   %-14s %8s %8s  %s\n", number, "(empty table)", "", said.c_str(), "", "",
-                mark(right));
-  } else if (placement.stranger) {
-    ++tally.strangers;
-    right = said == "unknown";
-    tally.strangers_right += right;
-    std::printf("  %3u  %-14s %7.1f\u00b0   %-14s %8s %8s  %s\n", number, (placement.object + "*").c_str(),
-                placement.yaw.degrees(), said.c_str(), "", "", mark(right));
-  } else {
-    ++tally.known;
-    right = said == placement.object;
-    tally.known_right += right;
-    std::string pose = "";
-    std::string error = "";
-    if (right && !is_observable(objects, placement.object)) {
-      pose = "any";
-      if (std::find(tally.without_pose.begin(), tally.without_pose.end(), placement.object) ==
-          tally.without_pose.end())
-        tally.without_pose.push_back(placement.object);
-    } else if (right) {
-      const Angle seen = degrees(outcomes[0].at("q").at(0).get<double>());
-      const double difference = std::abs(circular_difference(seen, placement.yaw).degrees());
-      tally.pose_errors_deg.push_back(difference);
-      char text[32];
-      std::snprintf(text, sizeof text, "%.1f\u00b0", seen.degrees());
-      pose = text;
-      std::snprintf(text, sizeof text, "%.2f\u00b0", difference);
-      error = text;
-    }
-    // A degree sign is two bytes and one column wide.
-    const int wide = pose == "any" || pose.empty() ? 8 : 9;
-    std::printf("  %3u  %-14s %7.1f\u00b0   %-14s %*s %*s  %s\n", number, placement.object.c_str(),
-                placement.yaw.degrees(), said.c_str(), wide, pose.c_str(), error.empty() ? 8 : 9,
-                error.c_str(), mark(right));
+    print_line(number, "(empty table)", "", said, nothing, right);
+    return;
   }
-  std::fflush(stdout);
+  const std::string placed =
+      placement.object + (placement.unknown ? "*" : "") + (placement.by_hand ? " +" : "");
+  const std::string truth = degree_text("%.1f\u00b0", placement.yaw.degrees());
+  const bool right = said == (placement.unknown ? "unknown" : placement.object);
+  ++(placement.unknown ? tally.unknown : tally.known);
+  (placement.unknown ? tally.unknown_right : tally.known_right) += right;
+  const bool has_pose = right && !placement.unknown;
+  print_line(number, placed, truth, said,
+             has_pose ? judge_pose(outcomes[0], placement, objects, tally) : nothing, right);
 }
 
 void save_picture(ApiClient& api, const std::string& folder, unsigned number) {
@@ -246,9 +298,11 @@ bool report(Tally& tally, const std::vector<std::string>& symmetric_learned) {
         "   pose error      mean %.2f\u00b0, median %.2f\u00b0, largest %.2f\u00b0 over %zu placements\n",
         mean, errors[errors.size() / 2], errors.back(), errors.size());
   for (const std::string& name : tally.without_pose)
-    std::printf("   left out        %s: its pose cannot be seen\n", name.c_str());
-  std::printf("   strangers       %u of %u unknown\n", tally.strangers_right, tally.strangers);
+    std::printf("   left out        %s: its pose is not observable\n", name.c_str());
+  std::printf("   unknown objects %u of %u reported as unknown\n", tally.unknown_right, tally.unknown);
   std::printf("   empty table     %u of %u seen as empty\n", tally.empty_right, tally.empty);
+  std::printf("   a hand          %u placements, %u wrong results while it was in the picture\n",
+              tally.by_hand, tally.hand_wrong);
 
   // Only what is symmetric in truth may go without a pose.
   bool honest = true;
@@ -258,8 +312,8 @@ bool report(Tally& tally, const std::vector<std::string>& symmetric_learned) {
       std::printf("   WRONG           %s has a pose that can be seen, and the model says it has none\n",
                   name.c_str());
     }
-  return honest && tally.known_right == tally.known && tally.strangers_right == tally.strangers &&
-         tally.empty_right == tally.empty && !errors.empty() && mean < 1.0;
+  return honest && tally.known_right == tally.known && tally.unknown_right == tally.unknown &&
+         tally.empty_right == tally.empty && tally.hand_wrong == 0 && !errors.empty() && mean < 1.0;
 }
 
 int run(const Options& options) {
@@ -268,26 +322,26 @@ int run(const Options& options) {
   sim::LabClient lab(options.runtime_dir + "/lab.sock");
   std::mt19937 random(options.seed);
 
-  std::vector<std::string> learned;
-  std::vector<std::string> strangers;
   const auto catalogue = lab.objects();
-  choose_objects(catalogue, options.objects, random, learned, strangers);
+  const Choice choice = choose_objects(catalogue, options.objects, random);
   std::vector<std::string> symmetric;
   for (const auto& object : catalogue)
     if (object.symmetric) symmetric.push_back(object.name);
 
   std::printf("\n1. Acquire: the daemon turns the table through Modbus and takes %zu image sets\n",
-              learned.size());
-  acquire(api, lab, learned);
+              choice.learned.size());
+  acquire(api, lab, choice.learned);
   std::printf("\n2. Learn: the views become manifolds in one eigenspace\n");
   learn(api);
-  std::printf("\n3. Watch: %u placements at random poses; * marks a stranger that was never learned\n\n",
-              options.placements);
-  std::printf("    #  placed            truth   said               pose    error\n");
+  std::printf(
+      "\n3. Watch: %u placements at random poses; * marks an object that was never learned, + one that a\n"
+      "   hand puts down\n\n",
+      options.placements);
+  std::printf("    #  placed             truth   said               pose    error\n");
   const json objects = api.get("/v1/objects");
   Tally tally;
   unsigned number = 0;
-  for (const Placement& placement : plan(options, learned, strangers, random)) {
+  for (const Placement& placement : plan(options, choice, random)) {
     show(api, lab, placement, ++number, objects, tally);
     if (!options.pictures.empty()) save_picture(api, options.pictures, number);
   }
