@@ -184,7 +184,7 @@ void ModbusBus::Connection::send_tcp(int unit, std::span<const std::uint8_t> req
   frame[6] = low(unit);
   std::copy(request.begin(), request.end(), frame.begin() + mbap_length);
   const std::size_t total = request.size() + mbap_length;
-  const ssize_t sent = send(modbus_get_socket(context_), frame.data(), total, MSG_NOSIGNAL);
+  const ssize_t sent = send(modbus_get_socket(context_), frame.data(), total, MSG_NOSIGNAL | MSG_DONTWAIT);
   if (sent < 0) fail_with_errno(errno);
   if (static_cast<std::size_t>(sent) != total)
     throw ModbusFailure{ModbusFault::no_connection, "the connection takes no more data"};
@@ -220,6 +220,16 @@ void ModbusBus::Connection::receive_serial(rtu::Answer& answer,
   }
 }
 
+std::vector<std::uint8_t> ModbusBus::Connection::send_serial(int unit,
+                                                             std::span<const std::uint8_t> request) {
+  wait_for_silent_interval();
+  std::vector<std::uint8_t> raw = {low(unit)};
+  raw.insert(raw.end(), request.begin(), request.end());
+  modbus_set_slave(context_, unit);
+  if (modbus_send_raw_request(context_, raw.data(), static_cast<int>(raw.size())) < 0) fail_with_errno(errno);
+  return rtu::with_checksum(raw);
+}
+
 // Whether the adapter echoes cannot be seen in the answer to function 06, which equals its request. A read
 // tells, whatever the device says to it.
 void ModbusBus::Connection::learn_echo(int unit, std::span<const std::uint8_t> request, Duration timeout) {
@@ -227,7 +237,10 @@ void ModbusBus::Connection::learn_echo(int unit, std::span<const std::uint8_t> r
   try {
     (void)exchange(unit, probe, timeout);
   } catch (const ModbusFailure& failure) {
-    if (failure.fault != ModbusFault::refused) throw;
+    if (failure.fault == ModbusFault::refused) return;
+    // The request may be a stop: it goes out all the same, for a device that hears and cannot be heard.
+    (void)send_serial(unit, request);
+    throw;
   }
 }
 
@@ -235,16 +248,9 @@ std::span<const std::uint8_t> ModbusBus::Connection::exchange_serial(int unit,
                                                                      std::span<const std::uint8_t> request,
                                                                      Duration timeout) {
   if (echo_ == rtu::Echo::unknown && request[0] == write_single_register) learn_echo(unit, request, timeout);
-  wait_for_silent_interval();
-  std::vector<std::uint8_t> raw = {low(unit)};
-  raw.insert(raw.end(), request.begin(), request.end());
-  modbus_set_slave(context_, unit);
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
-  if (modbus_send_raw_request(context_, raw.data(), static_cast<int>(raw.size())) < 0) fail_with_errno(errno);
-
-  rtu::Answer answer(rtu::with_checksum(raw), echo_);
+  rtu::Answer answer(send_serial(unit, request), echo_);
   try {
-    receive_serial(answer, deadline);
+    receive_serial(answer, std::chrono::steady_clock::now() + timeout);
   } catch (const ModbusFailure&) {
     last_frame_ = std::chrono::steady_clock::now();
     throw;

@@ -63,6 +63,8 @@ class ModbusBus::Connection {
                                                 Duration timeout);
   void discard_stale_input();
   void send_tcp(int unit, std::span<const std::uint8_t> request);
+  /// @return the whole frame.
+  std::vector<std::uint8_t> send_serial(int unit, std::span<const std::uint8_t> request);
   void receive_serial(rtu::Answer& answer, std::chrono::steady_clock::time_point deadline);
   void learn_echo(int unit, std::span<const std::uint8_t> request, Duration timeout);
   void wait_for_silent_interval();

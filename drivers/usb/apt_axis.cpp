@@ -88,8 +88,9 @@ std::int32_t AptAxis::counts_of(const std::string& operation, double position) c
   return static_cast<std::int32_t>(counts);
 }
 
-template <class Work>
-auto AptAxis::with_retries(const std::string& operation, TimePoint deadline, const Work& work) {
+template <class Work, class First>
+auto AptAxis::with_retries(const std::string& operation, TimePoint deadline, const Work& work,
+                           const First& first) {
   if (clock_.now() >= deadline)
     throw DeviceTimeout(options_.name, operation, "no time left before the deadline");
   for (int attempt = 1;; ++attempt) {
@@ -100,6 +101,7 @@ auto AptAxis::with_retries(const std::string& operation, TimePoint deadline, con
         link_suspect_ = false;
         is_set_up_ = false;
       }
+      first();
       if (!is_set_up_) set_up(operation, deadline);
       return work();
     } catch (const DeviceError& failure) {
@@ -218,13 +220,15 @@ AxisState AptAxis::state(TimePoint deadline) {
 void AptAxis::send_stop(TimePoint deadline) {
   const std::string operation = "stop";
   const std::lock_guard lock(link_mutex_);
-  with_retries(operation, deadline, [&] {
+  // Sent before all else: a controller that no longer answers may still hear.
+  const auto stop = [&] {
     transmit(
         apt::short_message(Message::move_stop, options_.channel, stop_along_the_ramp, options_.controller),
         deadline);
-    // Bytes that were taken are not yet heard; an answer says that the controller still listens.
-    (void)ask_status(operation, deadline);
-  });
+  };
+  // Bytes that were taken are not yet heard; an answer says that the controller still listens.
+  with_retries(
+      operation, deadline, [&] { (void)ask_status(operation, deadline); }, stop);
 }
 
 void AptAxis::stop_motion() {

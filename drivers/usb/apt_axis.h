@@ -65,8 +65,13 @@ class AptAxis final : public Axis {
   std::string stop_after_failure();
 
   // With link_mutex_ held:
+  /// @param first is done in each attempt as soon as the link is open, before the controller is set up.
+  template <class Work, class First>
+  auto with_retries(const std::string& operation, TimePoint deadline, const Work& work, const First& first);
   template <class Work>
-  auto with_retries(const std::string& operation, TimePoint deadline, const Work& work);
+  auto with_retries(const std::string& operation, TimePoint deadline, const Work& work) {
+    return with_retries(operation, deadline, work, [] {});
+  }
   void set_up(const std::string& operation, TimePoint deadline);
   void transmit(std::span<const std::uint8_t> message, TimePoint deadline);
   apt::Status ask_status(const std::string& operation, TimePoint deadline);

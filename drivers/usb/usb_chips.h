@@ -1,6 +1,6 @@
 #pragma once
 
-/// libusb's things with their owners, and the FTDI chips that are plugged in. Not for other folders.
+/// Owners of libusb's context and handles, and the FTDI chips that are plugged in. Not for other folders.
 
 #include <cstdint>
 #include <span>

@@ -1,11 +1,13 @@
 #include "sim/lab/lab_requests.h"
 
-#include <functional>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/json.h"
 #include "sim/modbus/modbus_server.h"
 
 namespace eigenpose::sim {
@@ -17,24 +19,45 @@ double seconds_of(TimePoint when) {
   return std::chrono::duration<double>(when.time_since_epoch()).count();
 }
 
-template <class T>
-T value_or(const Json& request, const char* key, T otherwise) {
+constexpr std::int64_t most_faults = 1'000'000;  ///< planned at once
+constexpr double no_limit = std::numeric_limits<double>::max();
+
+/// The optional members of a request, each converted strictly and within its range.
+const Json* member(const Json& request, const char* key) {
   const auto found = request.find(key);
-  return found == request.end() || found->is_null() ? otherwise : found->get<T>();
+  return found == request.end() || found->is_null() ? nullptr : &*found;
+}
+double number_or(const Json& request, const char* key, double otherwise, double lower = -no_limit,
+                 double upper = no_limit) {
+  const Json* value = member(request, key);
+  return value == nullptr ? otherwise : json_number(*value, key, lower, upper);
+}
+std::int64_t integer_or(const Json& request, const char* key, std::int64_t otherwise, std::int64_t lower,
+                        std::int64_t upper) {
+  const Json* value = member(request, key);
+  return value == nullptr ? otherwise : json_integer(*value, key, lower, upper);
+}
+bool flag_or(const Json& request, const char* key) {
+  const Json* value = member(request, key);
+  return value != nullptr && json_flag(*value, key);
+}
+bool needed_flag(const Json& request, const char* key) {
+  return json_flag(json_member(request, key), key);
 }
 
 Json place(SimLab& lab, const Json& request) {
-  const auto object = request.at("object").get<std::string>();
-  const Angle yaw = degrees(value_or(request, "yaw_deg", 0.0));
-  const double x_mm = value_or(request, "x_mm", 0.0);
-  const double y_mm = value_or(request, "y_mm", 0.0);
-  const bool hand = value_or(request, "hand", false);
+  const std::string object = json_text(json_member(request, "object"), "object");
+  const Angle yaw = degrees(number_or(request, "yaw_deg", 0.0));
+  const double x_mm = number_or(request, "x_mm", 0.0);
+  const double y_mm = number_or(request, "y_mm", 0.0);
+  const bool hand = flag_or(request, "hand");
   return {{"id", hand ? lab.place_by_hand(object, yaw, x_mm, y_mm) : lab.place(object, yaw, x_mm, y_mm)}};
 }
 
 Json remove(SimLab& lab, const Json& request) {
-  const auto id = request.at("id").get<std::uint64_t>();
-  if (value_or(request, "hand", false)) {
+  const auto id = static_cast<std::uint64_t>(
+      json_integer(json_member(request, "id"), "id", 1, std::numeric_limits<std::int64_t>::max()));
+  if (flag_or(request, "hand")) {
     lab.remove_by_hand(id);
   } else {
     lab.remove(id);
@@ -78,13 +101,13 @@ Json truth_of(const SimLab& lab) {
 }
 
 CameraFaults camera_faults_of(const Json& request) {
-  return {value_or(request, "stalled", false), value_or(request, "lost", false),
-          value_or(request, "extra_noise", 0.0), value_or(request, "damaged_fraction", 0.0)};
+  return {flag_or(request, "stalled"), flag_or(request, "lost"), number_or(request, "extra_noise", 0.0),
+          number_or(request, "damaged_fraction", 0.0)};
 }
 
 DriveFaults drive_faults_of(const Json& request) {
-  return {value_or(request, "stuck", false), value_or(request, "slip_steps", 0.0),
-          value_or(request, "backlash_deg", 0.0), value_or(request, "dead", false)};
+  return {flag_or(request, "stuck"), number_or(request, "slip_steps", 0.0),
+          number_or(request, "backlash_deg", 0.0), flag_or(request, "dead")};
 }
 
 WireFaultKind kind_of(const std::string& name) {
@@ -107,20 +130,24 @@ WireFaultKind kind_of(const std::string& name) {
 }
 
 WireFault wire_fault_of(const Json& request) {
-  return {kind_of(request.at("kind").get<std::string>()),
-          std::chrono::milliseconds(value_or(request, "delay_ms", 300)),
-          static_cast<std::uint8_t>(value_or(request, "exception_code", 4))};
+  return {kind_of(json_text(json_member(request, "kind"), "kind")),
+          std::chrono::milliseconds(integer_or(request, "delay_ms", 300, 0, 3'600'000)),
+          static_cast<std::uint8_t>(integer_or(request, "exception_code", 4, 1, 255))};
 }
 
 Json obey_about_drives(SimModbusServer& modbus, const std::string& what, const Json& request) {
-  const auto drive = [&]() -> AzDrive& { return modbus.drive(value_or<std::uint8_t>(request, "unit", 1)); };
+  const auto drive = [&]() -> AzDrive& {
+    return modbus.drive(static_cast<std::uint8_t>(integer_or(request, "unit", 1, 1, 247)));
+  };
   if (what == "drive_faults") {
     drive().set_faults(drive_faults_of(request));
   } else if (what == "alarm") {
-    drive().raise_alarm(request.at("code").get<int>());
+    drive().raise_alarm(static_cast<int>(json_integer(json_member(request, "code"), "code", 1, 0xFFFF)));
   } else if (what == "wire_fault") {
-    modbus.faults().add(wire_fault_of(request), value_or(request, "times", 1), value_or(request, "skip", 0));
-  } else if (request.at("alive").get<bool>()) {
+    modbus.faults().add(wire_fault_of(request),
+                        static_cast<int>(integer_or(request, "times", 1, 1, most_faults)),
+                        static_cast<int>(integer_or(request, "skip", 0, 0, most_faults)));
+  } else if (needed_flag(request, "alive")) {
     modbus.revive();
   } else {
     modbus.die();
@@ -129,7 +156,7 @@ Json obey_about_drives(SimModbusServer& modbus, const std::string& what, const J
 }
 
 Json obey(SimLab& lab, SimModbusServer* modbus, const Json& request) {
-  const auto what = request.at("do").get<std::string>();
+  const std::string what = json_text(json_member(request, "do"), "do");
   if (what == "place") return place(lab, request);
   if (what == "remove") return remove(lab, request);
   if (what == "objects") return objects_of(lab);
@@ -139,11 +166,11 @@ Json obey(SimLab& lab, SimModbusServer* modbus, const Json& request) {
     return Json::object();
   }
   if (what == "hand") {
-    request.at("in").get<bool>() ? lab.hand_in() : lab.hand_out();
+    needed_flag(request, "in") ? lab.hand_in() : lab.hand_out();
     return Json::object();
   }
   if (what == "lamp") {
-    lab.set_lamp_level(request.at("level").get<double>());
+    lab.set_lamp_level(json_number(json_member(request, "level"), "level"));
     return Json::object();
   }
   if (what == "camera_faults") {
@@ -164,9 +191,9 @@ Json obey(SimLab& lab, SimModbusServer* modbus, const Json& request) {
 std::string obey_lab_request(SimLab& lab, SimModbusServer* modbus, std::string_view line) {
   Json answer;
   try {
-    answer = obey(lab, modbus, Json::parse(line));
+    answer = obey(lab, modbus, parse_json(line));
     answer["ok"] = true;
-  } catch (const Json::exception& error) {
+  } catch (const JsonError& error) {
     answer = {{"ok", false}, {"error", std::string("not a request the lab understands: ") + error.what()}};
   } catch (const std::exception& error) {
     answer = {{"ok", false}, {"error", error.what()}};

@@ -51,7 +51,7 @@ AzDrive::AzDrive(SimLab& lab, const DriveOptions& options, double speed_factor)
     registers_[address] = static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) >> 16U);
     registers_[address + 1] = static_cast<std::uint16_t>(value);
   };
-  for (const Range& range : kept_ranges) {
+  for (const RegisterRange& range : kept_ranges) {
     for (std::uint16_t address = range.first; address <= range.last; ++address) registers_[address] = 0;
   }
   keep(reg_operation_type, 2);

@@ -32,20 +32,20 @@ inline constexpr std::uint16_t reg_alarm_reset = 0x0180;
 inline constexpr std::uint16_t reg_preset = 0x018A;
 inline constexpr std::uint16_t reg_communication_timeout = 0x138A;
 
-struct Range {
+struct RegisterRange {
   std::uint16_t first;
   std::uint16_t last;
 };
 /// What can be read and written back.
-inline constexpr Range kept_ranges[] = {
+inline constexpr RegisterRange kept_ranges[] = {
     {0x0058, 0x0069}, {0x0078, 0x007D}, {0x0180, 0x0181}, {0x018A, 0x018B}, {0x1380, 0x1393}};
 /// What can only be read.
-inline constexpr Range monitor_ranges[] = {{0x007E, 0x0081}, {0x00C6, 0x00D1}};
+inline constexpr RegisterRange monitor_ranges[] = {{0x007E, 0x0081}, {0x00C6, 0x00D1}};
 
 template <std::size_t n>
-bool within(const Range (&ranges)[n], std::uint16_t address) {
+bool within(const RegisterRange (&ranges)[n], std::uint16_t address) {
   return std::any_of(std::begin(ranges), std::end(ranges),
-                     [&](const Range& r) { return address >= r.first && address <= r.last; });
+                     [&](const RegisterRange& r) { return address >= r.first && address <= r.last; });
 }
 
 // Input and output bits -----------------------------------------------------------------------------------

@@ -1,10 +1,12 @@
 /// The main job as its users see it: the real service on the simulated lab, commanded and read over its
 /// sockets; objects are placed through the lab's socket, and its truth is what results are compared with.
 
+#include <cmath>
 #include <condition_variable>
 #include <csignal>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <sstream>
 #include <string>
@@ -62,6 +64,11 @@ constexpr double pose_bound_deg = 5.0;
 
 double monotonic_s() {
   return std::chrono::duration<double>(SteadyClock().now().time_since_epoch()).count();
+}
+
+/// Between two questions, so that the service and the lab have the machine.
+void pause() {
+  SteadyClock().sleep_for(std::chrono::milliseconds(3));
 }
 
 /// Keeps every result that the service streams from construction on.
@@ -123,7 +130,7 @@ class EndToEnd : public testing::Test {
         (void)read_.get("/v1/status");
         break;
       } catch (const FileError&) {
-        std::this_thread::yield();  // it is starting
+        pause();  // it is starting
       }
     }
     lab_ = std::make_unique<sim::LabClient>(run_ / "lab.sock");
@@ -150,6 +157,7 @@ class EndToEnd : public testing::Test {
       const double before_s = monotonic_s();
       if (!condition(lab_->truth())) return last_s;
       last_s = before_s;
+      pause();
     }
   }
   /// A hand comes, puts the object down and leaves. @return since when the picture may be free of the hand.

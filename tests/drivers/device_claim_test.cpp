@@ -101,7 +101,7 @@ TEST_F(DeviceClaims, TheMachinesFolderGoesBeforeTheUsersOwn) {
   EXPECT_EQ(claims_folder(places()), own) << "made once";
 }
 
-TEST_F(DeviceClaims, AFolderThatStrangersMayWriteToIsNotTrusted) {
+TEST_F(DeviceClaims, AFolderThatAnybodyMayWriteToIsNotTrusted) {
   fs::permissions(shared_, fs::perms::all);
   const fs::path own = claims_folder(places());
   EXPECT_EQ(own.parent_path(), home_);

@@ -1,5 +1,5 @@
 // The Modbus axis on simulated drives: the conformance suite over TCP and RTU, with and without a line that
-// spoils one request in twenty, and what is Modbus's own.
+// damages one request in twenty, and what is Modbus's own.
 
 #include "drivers/modbus/modbus_axis.h"
 
@@ -55,7 +55,7 @@ class ModbusAxisTest : public testing::Test {
   ModbusRig rig_{ModbusLine::tcp, 0.0, 300ms};
 };
 
-TEST_F(ModbusAxisTest, ASpoiltAnswerIsAskedForAgain) {
+TEST_F(ModbusAxisTest, ADamagedAnswerIsAskedForAgain) {
   for (const WireFaultKind kind :
        {WireFaultKind::silence, WireFaultKind::loss, WireFaultKind::partial, WireFaultKind::wrong_unit,
         WireFaultKind::wrong_transaction, WireFaultKind::close_connection}) {

@@ -362,6 +362,15 @@ TEST_F(ModbusOnAnEchoingLine, TheEchoOfAWriteIsNotItsConfirmation) {
   EXPECT_THROW(write(1), DeviceTimeout) << "nobody but the adapter has heard it";
 }
 
+TEST(ModbusOnASerialLine, AStopGoesOutToADriveThatCannotBeHeard) {
+  ModbusRig rig(ModbusLine::rtu, 0.0);
+  rig.turn_steadily(3.0);
+  while (!rig.truly_moving()) std::this_thread::yield();
+  rig.faults().at_random(1.0, 1, {{sim::WireFaultKind::silence}});  // it hears all, and nobody hears it
+  EXPECT_THROW(rig.axis().stop_motion(), DeviceError);
+  while (rig.truly_moving()) std::this_thread::yield();
+}
+
 TEST_F(ModbusOnAnEchoingLine, ASilentDriveIsStillASilentDrive) {
   rig_.silence(true);
   EXPECT_THAT(failure_of<DeviceTimeout>([&] { rig_.axis().state(in(60s)); }), HasSubstr("no answer"));

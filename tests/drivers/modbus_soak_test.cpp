@@ -1,4 +1,4 @@
-// Ten thousand transactions on a line that spoils one request in twenty at random.
+// Ten thousand transactions on a line that damages one request in twenty at random.
 
 #include <chrono>
 #include <cstdlib>

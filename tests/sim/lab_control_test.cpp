@@ -72,10 +72,31 @@ TEST_F(LabControl, SaysWhyItRefuses) {
 TEST_F(LabControl, BadLinesGetAnAnswerAndChangeNothing) {
   for (const char* line :
        {"", "{", "[]", "3", "{\"do\": 5}", "{\"do\": \"place\"}", "{\"do\": \"place\", \"object\": 4}",
-        "{\"do\": \"lamp\", \"level\": 7}", "{\"do\": \"remove\", \"id\": -1}", "{\"do\": \"fly\"}"}) {
+        "{\"do\": \"lamp\", \"level\": 7}", "{\"do\": \"remove\", \"id\": -1}", "{\"do\": \"fly\"}",
+        "{\"do\": \"lamp\", \"level\": true}", "{\"do\": \"lamp\", \"level\": \"1\"}",
+        "{\"do\": \"hand\", \"in\": 1}", "{\"do\": \"hand\"}",
+        "{\"do\": \"place\", \"object\": \"mug\", \"x_mm\": \"3\"}",
+        "{\"do\": \"place\", \"object\": \"mug\", \"x_mm\": 500}",
+        "{\"do\": \"place\", \"object\": \"mug\", \"hand\": 1}",
+        "{\"do\": \"place\", \"object\": \"mug\", \"object\": \"duck\"}"}) {
     EXPECT_THAT(obey_lab_request(lab, nullptr, line), HasSubstr("\"ok\":false")) << line;
   }
   EXPECT_TRUE(lab.truth().objects.empty());
+}
+
+TEST_F(LabControl, NumbersThatCannotBeAreRefusedAndNotCut) {
+  SimModbusServer modbus(lab, {});
+  for (const char* line :
+       {"{\"do\": \"alarm\", \"code\": 48, \"unit\": 257}",
+        "{\"do\": \"alarm\", \"code\": 48, \"unit\": 1.0}", "{\"do\": \"alarm\", \"code\": 48.5}",
+        "{\"do\": \"alarm\", \"code\": true}", "{\"do\": \"alarm\", \"code\": 4294967344}",
+        "{\"do\": \"wire_fault\", \"kind\": \"silence\", \"times\": 4294967297}",
+        "{\"do\": \"wire_fault\", \"kind\": \"exception\", \"exception_code\": 260}",
+        "{\"do\": \"wire_fault\", \"kind\": \"late\", \"delay_ms\": -1}",
+        "{\"do\": \"modbus\", \"alive\": 0}"})
+    EXPECT_THAT(obey_lab_request(lab, &modbus, line), HasSubstr("\"ok\":false")) << line;
+  EXPECT_EQ(modbus.drive(1).alarm(), 0);
+  EXPECT_EQ(modbus.faults().next().kind, WireFaultKind::none);
 }
 
 TEST_F(LabControl, FaultsReachCameraDrivesAndWire) {

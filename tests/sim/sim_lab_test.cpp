@@ -14,7 +14,7 @@ struct Lab : testing::Test {
   SimLab lab{clock};
 };
 
-TEST_F(Lab, HasTwelveObjectsToLearnAmongThemASymmetricOneAndTwoStrangersBeside) {
+TEST_F(Lab, HasTwelveObjectsToLearnASymmetricOneAmongThemAndTwoHeldOut) {
   int learnable = 0;
   int symmetric = 0;
   int held_out = 0;
