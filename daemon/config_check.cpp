@@ -7,7 +7,7 @@
 #include <sys/un.h>
 
 #include "core/base/error.h"
-#include "daemon/devices.h"
+#include "daemon/device_check.h"
 
 namespace eigenpose {
 namespace {

@@ -10,6 +10,7 @@
 
 #include "config/modbus_profile.h"
 #include "core/base/error.h"
+#include "daemon/device_check.h"
 #include "drivers/modbus/endpoint.h"
 #include "drivers/modbus/modbus_axis.h"
 #include "drivers/modbus/modbus_bus.h"

@@ -29,9 +29,4 @@ struct Devices {
 /// @throws ConfigError for a driver this program was built without, FileError for a profile or a lab socket.
 Devices make_devices(const Config& config, const Clock& clock);
 
-/// Everything that `make_devices`, and opening what it returns, would refuse and that can be known without
-/// opening a device, a port or a socket: drivers, profiles, stages, options that no driver takes.
-/// @throws ConfigError, FileError.
-void check_device_options(const Config& config);
-
 }  // namespace eigenpose
