@@ -16,6 +16,7 @@ must_run("cmake --install" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix
 
 foreach(file IN ITEMS bin/eigenpose bin/eigenposed include/eigenpose/core/recognition/recognizer.h
         lib/systemd/system/eigenposed.service lib/sysusers.d/eigenpose.conf lib/udev/rules.d/60-eigenpose.rules
+        lib/tmpfiles.d/eigenpose.conf
         share/doc/eigenpose/copyright share/doc/eigenpose/eigenposed.toml share/doc/eigenpose/rigs/simulated.toml
         share/man/man1/eigenpose.1 share/man/man8/eigenposed.8
         etc/eigenpose/eigenposed.toml etc/eigenpose/profiles/oriental_motor_az.toml)
