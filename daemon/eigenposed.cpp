@@ -1,12 +1,20 @@
 /// The service eigenposed. `run` is its whole life, top to bottom.
 
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pthread.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -23,7 +31,9 @@
 #include "daemon/config_check.h"
 #include "daemon/devices.h"
 #include "daemon/manual/man_page.h"
+#include "daemon/rig/heartbeat.h"
 #include "daemon/service/service.h"
+#include "daemon/service/state_lock.h"
 
 namespace eigenpose {
 namespace {
@@ -47,22 +57,44 @@ class Signals {
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGHUP, SIG_IGN);
   }
-  /// Waits until the service should end. Meanwhile tells systemd's watchdog that it lives.
-  [[nodiscard]] int wait() const {
+  /// Waits until the service should end. Meanwhile feeds systemd's watchdog, but only while every worker
+  /// turns.
+  [[nodiscard]] int wait(const Heartbeat& heartbeat) const {
     std::uint64_t watchdog_us = 0;
     const bool watched = ::sd_watchdog_enabled(0, &watchdog_us) > 0;
     const std::uint64_t period_us = watched ? watchdog_us / 3 : 60'000'000;
+    std::vector<std::string> reported;
     for (;;) {
       const timespec period{static_cast<time_t>(period_us / 1'000'000),
                             static_cast<long>(period_us % 1'000'000 * 1000)};
       const int signal = ::sigtimedwait(&ending_, nullptr, &period);
       if (signal > 0) return signal;
-      if (watched) ::sd_notify(0, "WATCHDOG=1");
+      std::vector<std::string> overdue = heartbeat.overdue();
+      if (watched && overdue.empty()) ::sd_notify(0, "WATCHDOG=1");
+      if (!overdue.empty() && overdue != reported)
+        spdlog::error("event=worker_hangs workers=\"{}\"", fmt::format("{}", fmt::join(overdue, ", ")));
+      reported = std::move(overdue);
     }
   }
 
  private:
   sigset_t ending_{};
+};
+
+/// Ends the process if the rest of the way out takes too long: the motors stand still by then, and every file
+/// is whole at any moment.
+class ExitDeadline {
+ public:
+  explicit ExitDeadline(const Clock& clock)
+      : thread_([&clock](const std::stop_token& left) {
+          if (!clock.sleep_for(longest_way_out, left)) return;
+          spdlog::critical("event=stop_timed_out seconds={}", longest_way_out.count());
+          std::_Exit(1);
+        }) {}
+
+ private:
+  static constexpr std::chrono::seconds longest_way_out{15};  ///< systemd kills after 20 s
+  std::jthread thread_;
 };
 
 void start_log(const std::string& level) {
@@ -103,11 +135,15 @@ void run(const Options& options) {
   // A second daemon is refused here, before any device is opened.
   const UnixSocket results(config.results_socket(), config.api.results_mode, config.api.results_group);
   const UnixSocket control(config.control_socket(), config.api.control_mode, config.api.control_group);
+  const StateLock state(config.daemon.state_dir);
   const SteadyClock clock;
+  std::optional<ExitDeadline> deadline;  // outlives all that may be slow to end
+  Heartbeat heartbeat(clock);
   EventPublisher publisher(static_cast<std::size_t>(config.api.event_buffer));
   Devices devices = make_devices(config, clock);
-  Service service(work, {devices.camera, devices.axes, devices.lamps}, publisher, clock);
-  Server server(server_options(config.api), make_handler({service, publisher.results(), devices.simulation}));
+  Service service(work, {devices.camera, devices.axes, devices.lamps}, publisher, heartbeat, clock);
+  Server server(server_options(config.api), make_handler({service, publisher.results(), devices.simulation}),
+                heartbeat);
   const EventLog::Subscription wake_streams = publisher.results()->subscribe([&server] { server.notify(); });
   server.listen(results, Access::read);
   server.listen(control, Access::control);
@@ -115,10 +151,13 @@ void run(const Options& options) {
   spdlog::info("event=ready results={} control={}", results.path().string(), control.path().string());
   ::sd_notify(0, "READY=1");
 
-  const int signal = signals.wait();
+  const int signal = signals.wait(heartbeat);
+  // First the motors, waiting for nobody; then the rest, within its deadline.
+  deadline.emplace(clock);
+  service.stop_motion();
   ::sd_notify(0, "STOPPING=1");
   spdlog::info("event=stopping signal={}", signal);
-  // Leaving the scope ends the rest in reverse: clients, jobs, motion, devices, sockets.
+  // Leaving the scope ends the rest in reverse: clients, jobs, devices, sockets.
 }
 
 int main_with_words(int argc, char** argv) {

@@ -42,7 +42,10 @@ json to_json(const CameraStatus& camera) {
                  {"frames_taken", camera.statistics.frames_taken},
                  {"frames_dropped", camera.statistics.frames_dropped},
                  {"frames_damaged", camera.statistics.frames_damaged},
-                 {"times_lost", camera.statistics.times_lost}};
+                 {"times_lost", camera.statistics.times_lost},
+                 {"frame_sequence", or_null(camera.frame_sequence)},
+                 {"frame_age_s", nullptr}};
+  if (camera.frame_age) result["frame_age_s"] = std::chrono::duration<double>(*camera.frame_age).count();
   if (camera.info) {
     result["name"] = camera.info->name;
     result["model"] = camera.info->model;
@@ -77,13 +80,26 @@ json to_json(const AxisStatus& axis) {
   return result;
 }
 
+json to_json(const LampStatus& lamp) {
+  return {{"name", lamp.name},
+          {"model", or_null(lamp.model)},
+          {"wanted_level", lamp.wanted_level},
+          {"level", or_null(lamp.level)},
+          {"error", or_null(lamp.error)}};
+}
+
 json to_json(const JobResult& result) {
   if (const auto* acquired = std::get_if<AcquisitionResult>(&result))
-    return {{"folder", acquired->folder.string()}, {"views", acquired->views}, {"kept", acquired->kept}};
+    return {{"folder", acquired->folder.string()},
+            {"views", acquired->views},
+            {"kept", acquired->kept},
+            {"retaken", acquired->retaken},
+            {"not_returned", or_null(acquired->not_returned)}};
   if (const auto* learned = std::get_if<LearningResult>(&result))
     return {{"objects", learned->objects},       {"views", learned->views},
             {"components", learned->components}, {"energy", learned->energy},
-            {"seconds", learned->time.count()},  {"file", learned->file.string()}};
+            {"seconds", learned->time.count()},  {"file", learned->file.string()},
+            {"left_out", learned->left_out}};
   return nullptr;
 }
 
@@ -106,13 +122,17 @@ json to_json(const JobStatus& job) {
 json status_json(const ApiSources& sources) {
   Service& service = sources.service;
   json axes = json::array();
-  for (const AxisStatus& axis : service.rig().status()) axes.push_back(to_json(axis));
+  json lamps = json::array();
+  const RigStatus rig = service.rig().status();
+  for (const AxisStatus& axis : rig.axes) axes.push_back(to_json(axis));
+  for (const LampStatus& lamp : rig.lamps) lamps.push_back(to_json(lamp));
   json running = json::array();
   for (const JobStatus& job : service.jobs().list())
     if (job.state == JobState::running) running.push_back(to_json(job));
   json plans = json::array();
   for (const Plan& plan : service.plans()) plans.push_back({{"name", plan.name}, {"views", plan.size()}});
 
+  const ServiceActivity activity = service.activity();
   const WatchStatus watched = service.watcher().status();
   json model = nullptr;
   if (const auto current = service.models().current()) {
@@ -133,9 +153,11 @@ json status_json(const ApiSources& sources) {
   return {{"program", "eigenposed"},
           {"version", EIGENPOSE_VERSION},
           {"started", iso_time(service.started())},
-          {"state", service_state_name(service.state())},
+          {"state", service_state_name(activity.state)},
+          {"since", iso_time(activity.since)},
           {"camera", to_json(service.camera().status())},
           {"axes", std::move(axes)},
+          {"lamps", std::move(lamps)},
           {"plans", std::move(plans)},
           {"model", std::move(model)},
           {"model_error", or_null(service.models().error())},
@@ -155,7 +177,7 @@ json objects_json(const Service& service) {
     json entry = {{"name", object.name},
                   {"image_set", nullptr},
                   {"learned", nullptr},
-                  {"error", or_null(object.trouble)}};
+                  {"error", or_null(object.error)}};
     if (object.acquired)
       entry["image_set"] = {{"views", object.acquired->views}, {"complete", object.acquired->complete}};
     if (object.learned_as && model && *object.learned_as < model->objects.size()) {

@@ -95,7 +95,7 @@ Answer get_results(const ApiSources& sources, const Request& request, const std:
 }
 
 Answer get_frame(const ApiSources& sources, const Request&, const std::string&) {
-  cv::Mat image = sources.service.newest_frame().image;
+  cv::Mat image = sources.service.newest_frame().frame.image;
   // JPEG has 8 bits; a 16-bit camera keeps its upper ones.
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 256.0);
   std::vector<unsigned char> bytes;

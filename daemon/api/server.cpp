@@ -101,8 +101,20 @@ struct Server::Impl {
   Handler handler;
   std::set<asio::steady_timer*> sleeping_streams;  ///< touched on the server's thread only
   std::vector<std::unique_ptr<Door>> doors;
+  Heartbeat::Pulse pulse;  ///< beaten on the server's thread
   std::unique_ptr<asio::io_context> io = std::make_unique<asio::io_context>(1);
   std::thread thread;
+
+  /// Reports that the thread turns, as long as no handler holds it up.
+  asio::awaitable<void> beat() {
+    asio::steady_timer timer(*io);
+    error_code error;
+    while (!error) {
+      pulse.beat();
+      timer.expires_after(std::chrono::seconds(1));
+      co_await timer.async_wait(capture(error));
+    }
+  }
 
   asio::awaitable<void> accept_all(Door& door) {
     for (;;) {
@@ -243,7 +255,9 @@ struct Server::Impl {
   }
 };
 
-Server::Server(const ServerOptions& options, Handler handler) : impl_(std::make_unique<Impl>()) {
+Server::Server(const ServerOptions& options, Handler handler, Heartbeat& heartbeat)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->pulse = heartbeat.join("server", std::chrono::seconds(15));
   impl_->options = options;
   impl_->handler = std::move(handler);
 }
@@ -259,6 +273,7 @@ void Server::listen(const UnixSocket& socket, Access access) {
 }
 
 void Server::start() {
+  asio::co_spawn(*impl_->io, impl_->beat(), asio::detached);
   for (const auto& door : impl_->doors) asio::co_spawn(*impl_->io, impl_->accept_all(*door), asio::detached);
   impl_->thread = std::thread([this] {
     for (;;) {

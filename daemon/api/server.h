@@ -11,6 +11,7 @@
 
 #include "daemon/api/http.h"
 #include "daemon/api/unix_socket.h"
+#include "daemon/rig/heartbeat.h"
 
 namespace eigenpose {
 
@@ -27,7 +28,8 @@ struct ServerOptions {
 /// the handler runs on the server's own.
 class Server {
  public:
-  Server(const ServerOptions& options, Handler handler);
+  /// @param heartbeat hears that the server's thread turns; outlives the server.
+  Server(const ServerOptions& options, Handler handler, Heartbeat& heartbeat);
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
   ~Server();

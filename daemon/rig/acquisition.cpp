@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
-#include <vector>
+#include <map>
+#include <utility>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
 #include "core/base/error.h"
-#include "core/dataset/image_set.h"
 
 namespace eigenpose {
 namespace {
@@ -17,69 +17,188 @@ namespace {
 /// Positions that differ by less are the same pose: far below the resolution of any axis, far above rounding.
 constexpr double same_position = 1e-6;
 
-bool same_pose(const Workspace& workspace, const std::vector<double>& a, const std::vector<double>& b) {
-  for (std::size_t i = 0; i < workspace.size(); ++i)
-    if (std::abs(workspace[i].difference(a[i], b[i])) > same_position) return false;
-  return true;
+/// The positions of one axis of a plan, by value.
+class PositionIndex {
+ public:
+  PositionIndex(const Dof& dof, const std::vector<double>& positions) : dof_(dof) {
+    for (std::size_t i = 0; i < positions.size(); ++i) sorted_.emplace_back(dof.canonical(positions[i]), i);
+    std::sort(sorted_.begin(), sorted_.end());
+  }
+  /// Which position `value` is; nothing if it is none.
+  [[nodiscard]] std::optional<std::size_t> find(double value) const {
+    const auto above = std::lower_bound(sorted_.begin(), sorted_.end(), std::pair(value, std::size_t{0}));
+    // The nearest is one of its neighbours, or across the seam of a turn.
+    const auto near = [&](auto candidate) {
+      return candidate != sorted_.end() &&
+             std::abs(dof_.difference(candidate->first, value)) <= same_position;
+    };
+    if (near(above)) return above->second;
+    if (above != sorted_.begin() && near(std::prev(above))) return std::prev(above)->second;
+    if (near(sorted_.begin())) return sorted_.begin()->second;
+    if (near(std::prev(sorted_.end()))) return std::prev(sorted_.end())->second;
+    return std::nullopt;
+  }
+
+ private:
+  const Dof& dof_;
+  std::vector<std::pair<double, std::size_t>> sorted_;  ///< canonical position, its number in the plan
+};
+
+nlohmann::json to_record(const std::vector<ActuatorPosition>& actuators) {
+  nlohmann::json record = nlohmann::json::object();
+  for (const ActuatorPosition& actuator : actuators)
+    record[actuator.name + "_" + actuator.unit] =
+        actuator.position ? nlohmann::json(*actuator.position) : nlohmann::json(nullptr);
+  return record;
 }
 
-/// The poses of the plan that no view shows yet, in the plan's order.
-std::vector<std::vector<double>> poses_to_take(const AcquisitionRequest& request, const ImageSetWriter& set) {
-  std::vector<std::vector<double>> poses;
-  for (std::size_t i = 0; i < request.plan.size(); ++i) {
-    std::vector<double> q = request.workspace.canonical(request.plan.at(i));
-    const bool there = std::any_of(set.views().begin(), set.views().end(), [&](const ViewRecord& view) {
-      return same_pose(request.workspace, view.q, q);
-    });
-    if (!there) poses.push_back(std::move(q));
-  }
-  return poses;
-}
+/// One run, on the rig's thread.
+class Run {
+ public:
+  Run(const AcquisitionRequest& request, const AcquisitionDevices& devices, Rig::Control& axes,
+      AcquisitionReport& report, const std::stop_token& stop)
+      : request_(request), devices_(devices), axes_(axes), report_(report), stop_(stop) {}
 
-/// Moves the axes whose position changes, one after the other. @return how long they take to settle.
-Duration move_to_pose(const AcquisitionRequest& request, Rig::Control& axes, const std::vector<double>& q,
-                      std::vector<double>& now, const std::stop_token& stop) {
-  Duration settle{0};
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    if (!now.empty() && now[i] == q[i]) continue;
-    const std::string& axis = request.plan.axes[i].axis;
-    axes.move_to(axis, q[i], stop);
-    settle = std::max(settle, axes.settle_time(axis));
+  /// Moves the axes whose position changes, waits until all have come to rest, and takes the picture; again
+  /// when an axis has moved meanwhile.
+  Frame take(const std::vector<double>& q) {
+    for (int retakes = 0;; ++retakes) {
+      move_to(q);
+      const TimePoint rest = devices_.clock.now();
+      axes_.allow(request_.frame_timeout);
+      Frame frame = devices_.camera.exposed_after(rest, rest + request_.frame_timeout, stop_);
+      axes_.light_lamps();  // a view that may have been taken in the dark is not stored
+      const std::optional<std::size_t> strayed = find_strayed(q);
+      if (!strayed) return frame;
+      const std::string& axis = request_.plan.axes[*strayed].axis;
+      const std::string cause =
+          fmt::format("stood at {} after the picture, not at {}", measured_[*strayed], q[*strayed]);
+      if (retakes == request_.most_retakes)
+        throw DeviceError(axis, "hold its position",
+                          fmt::format("{}, {} times: check its brake and load", cause, retakes + 1));
+      spdlog::warn("event=view_retaken axis={} cause=\"{}\"", axis, cause);
+      ++report_.retaken;
+      now_.clear();  // where the axes stand is not known: all are moved again
+    }
   }
-  now = q;
-  return settle;
-}
+  /// The pose read back after the last picture.
+  [[nodiscard]] const std::vector<double>& measured() const { return measured_; }
+
+  /// Remembers where the axes of the plan stand before they are moved.
+  void note_start(const std::vector<ActuatorPosition>& actuators) {
+    for (const ActuatorPosition& actuator : actuators) start_[actuator.name] = actuator.position;
+  }
+  /// Moves each axis of the plan back.
+  void return_axes() {
+    const std::vector<double> first = request_.workspace.canonical(request_.plan.at(0));
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      const std::string& axis = request_.plan.axes[i].axis;
+      axes_.move_to(axis, start_[axis].value_or(first[i]), stop_);
+    }
+  }
+
+ private:
+  void move_to(const std::vector<double>& q) {
+    Duration settle{0};
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      if (!now_.empty() && now_[i] == q[i]) continue;
+      const std::string& axis = request_.plan.axes[i].axis;
+      axes_.move_to(axis, q[i], stop_);
+      settle = std::max(settle, axes_.settle_time(axis));
+    }
+    now_ = q;
+    axes_.allow(settle);
+    if (!devices_.clock.sleep_for(settle, stop_)) throw Interrupted();
+  }
+
+  /// Reads every axis of the plan again. @return the first one that does not stand at `q`.
+  std::optional<std::size_t> find_strayed(const std::vector<double>& q) {
+    std::optional<std::size_t> strayed;
+    measured_.resize(q.size());
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      const std::string& axis = request_.plan.axes[i].axis;
+      const AxisState state = axes_.state(axis);
+      if (state.alarm) throw DeviceError(axis, "take a picture", *state.alarm);
+      measured_[i] = state.position;
+      const double tolerance = std::max(axes_.arrival_tolerance(axis), same_position);
+      const bool stands = state.homed && !state.moving &&
+                          std::abs(request_.workspace[i].difference(state.position, q[i])) <= tolerance;
+      if (!stands && !strayed) strayed = i;
+    }
+    return strayed;
+  }
+
+  const AcquisitionRequest& request_;
+  const AcquisitionDevices& devices_;
+  Rig::Control& axes_;
+  AcquisitionReport& report_;
+  const std::stop_token& stop_;
+  std::vector<double> now_;       ///< the pose the axes were last moved to; empty: not known
+  std::vector<double> measured_;  ///< the pose read back
+  std::map<std::string, std::optional<double>> start_;
+};
 
 }  // namespace
 
-void acquire(const AcquisitionRequest& request, Rig& rig, FrameHub& camera, const Clock& clock,
-             AcquisitionReport& report, const Progress& progress, std::stop_token stop) {
+std::vector<std::vector<double>> missing_poses(const Plan& plan, const Workspace& workspace,
+                                               std::span<const ViewRecord> views) {
+  std::vector<PositionIndex> axes;
+  for (std::size_t a = 0; a < plan.axes.size(); ++a) axes.emplace_back(workspace[a], plan.axes[a].positions);
+  std::vector<bool> taken(plan.size(), false);
+  for (const ViewRecord& view : views) {
+    std::size_t number = 0;
+    bool on_grid = view.q.size() == axes.size();
+    for (std::size_t a = 0; on_grid && a < axes.size(); ++a) {
+      const std::optional<std::size_t> position = axes[a].find(view.q[a]);
+      on_grid = position.has_value();
+      number = number * plan.axes[a].positions.size() + position.value_or(0);
+    }
+    if (on_grid) taken[number] = true;
+  }
+  std::vector<std::vector<double>> poses;
+  for (std::size_t i = 0; i < taken.size(); ++i)
+    if (!taken[i]) poses.push_back(workspace.canonical(plan.at(i)));
+  return poses;
+}
+
+void acquire(const AcquisitionRequest& request, const AcquisitionDevices& devices, AcquisitionReport& report,
+             const Progress& progress, const std::stop_token& stop) {
   report.total = request.plan.size();
-  ImageSetWriter set(request.image_sets, request.object, request.workspace,
-                     nlohmann::json{{"acquired_by", "eigenposed"}, {"plan", request.plan.name}});
-  report.folder = set.folder();
-  const std::vector<std::vector<double>> poses = poses_to_take(request, set);
-  report.kept = report.total - poses.size();
-  spdlog::info("event=acquisition_started object={} plan={} views={} kept={}", request.object,
-               request.plan.name, report.total, report.kept);
-  const FrameHub::OnDemand on_demand(camera);
-  rig.run([&](Rig::Control& axes) {
-    std::vector<double> now;
+  const FrameHub::OnDemand on_demand(devices.camera);
+  devices.rig.run([&](Rig::Control& axes) {
+    const std::vector<ActuatorPosition> actuators = axes.actuators();
+    ImageSetWriter set(
+        request.image_sets, request.object, request.workspace,
+        nlohmann::json{
+            {"acquired_by", "eigenposed"}, {"plan", request.plan.name}, {"actuators", to_record(actuators)}});
+    report.folder = set.folder();
+    const std::vector<std::vector<double>> poses =
+        missing_poses(request.plan, request.workspace, set.views());
+    report.kept = report.total - poses.size();
+    spdlog::info("event=acquisition_started object={} plan={} views={} kept={}", request.object,
+                 request.plan.name, report.total, report.kept);
+    Run run(request, devices, axes, report, stop);
+    run.note_start(actuators);
+    if (!poses.empty()) axes.light_lamps();
     for (const std::vector<double>& q : poses) {
       if (progress) progress({"acquiring", report.kept + report.taken, report.total});
-      const Duration settle = move_to_pose(request, axes, q, now, stop);
-      if (!clock.sleep_for(settle, stop)) throw Interrupted();
-      const TimePoint rest = clock.now();
-      const Frame frame = camera.exposed_after(rest, rest + request.frame_timeout, stop);
-      set.add(frame.image, q);
+      const Frame frame = run.take(q);
+      set.add(frame.image, q, nlohmann::json{{"measured_q", run.measured()}});
       ++report.taken;
     }
     set.finish();
     if (progress) progress({"acquiring", report.total, report.total});
-    const std::vector<double> first = request.workspace.canonical(request.plan.at(0));
-    if (!poses.empty()) move_to_pose(request, axes, first, now, stop);
+    if (poses.empty()) return;
+    try {
+      run.return_axes();
+    } catch (const Error& error) {
+      // The set is complete and stays so.
+      report.not_returned = error.what();
+      spdlog::warn("event=axes_not_returned object={} error=\"{}\"", request.object, error.what());
+    }
   });
-  spdlog::info("event=acquisition_done object={} views={}", request.object, report.total);
+  spdlog::info("event=acquisition_done object={} views={} retaken={}", request.object, report.total,
+               report.retaken);
 }
 
 }  // namespace eigenpose

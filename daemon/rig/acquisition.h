@@ -4,12 +4,16 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "core/base/clock.h"
 #include "core/base/progress.h"
 #include "core/base/workspace.h"
+#include "core/dataset/image_set.h"
 #include "daemon/rig/frame_hub.h"
 #include "daemon/rig/plan.h"
 #include "daemon/rig/rig.h"
@@ -18,26 +22,46 @@ namespace eigenpose {
 
 struct AcquisitionRequest {
   std::string object;
-  Plan plan;                                          ///< checked against the rig's axes
+  Plan plan;                                          ///< made for the rig's axes
   Workspace workspace;                                ///< of the plan
   std::filesystem::path image_sets;                   ///< the new set is a folder in here
   Duration frame_timeout = std::chrono::seconds(10);  ///< to wait for a frame exposed after arrival
+  /// How often one view is taken again because an axis did not stay where it was put. Then the run fails.
+  int most_retakes = 3;
 };
 
 /// How far it came. Filled as it goes, so that it is true also when the acquisition fails.
 struct AcquisitionReport {
   std::filesystem::path folder;
-  std::size_t kept = 0;   ///< views that stood there from an earlier, interrupted run
-  std::size_t taken = 0;  ///< views taken now
-  std::size_t total = 0;  ///< views of the plan
+  std::size_t kept = 0;     ///< views that stood there from an earlier, interrupted run
+  std::size_t taken = 0;    ///< views taken now
+  std::size_t retaken = 0;  ///< pictures thrown away because an axis moved meanwhile
+  std::size_t total = 0;    ///< views of the plan
+  /// Why an axis does not stand where it stood before the run. The set is complete all the same.
+  std::optional<std::string> not_returned;
 };
 
-/// Visits the grid of the plan and takes one raw picture a pose, after every moved axis has arrived and
-/// settled, from a frame exposed after that. Each view is on disk before the next move; views an earlier run
-/// has taken are not taken again. At the end the axes return to the plan's first pose.
+/// What an acquisition works with. All outlive it.
+struct AcquisitionDevices {
+  Rig& rig;
+  FrameHub& camera;
+  const Clock& clock;
+};
+
+/// Visits the grid of the plan and takes one raw picture a pose: with every lamp lit, after every moved axis
+/// has arrived and settled, from a frame exposed after that, and only if each axis still stands there
+/// afterwards. Each view is on disk before the next move, with the pose read back beside the pose of the
+/// plan; views an earlier run has taken are not taken again. The set records where every actuator of the rig
+/// stood. At the end each axis that was moved returns to where it stood before, or to the plan's first pose
+/// if that is not known; a failure to return is reported and does not fail the set.
 /// @throws FileError (a complete set of that name, a full disk) before or between moves, DeviceError and its
 /// kinds, Interrupted. Whatever ends it: no motion is left running, and what was taken is kept.
-void acquire(const AcquisitionRequest& request, Rig& rig, FrameHub& camera, const Clock& clock,
-             AcquisitionReport& report, const Progress& progress, std::stop_token stop);
+void acquire(const AcquisitionRequest& request, const AcquisitionDevices& devices, AcquisitionReport& report,
+             const Progress& progress, const std::stop_token& stop);
+
+/// The poses of the plan that none of `views` shows, canonical, in the plan's order. Costs O(n log n) for n
+/// views.
+std::vector<std::vector<double>> missing_poses(const Plan& plan, const Workspace& workspace,
+                                               std::span<const ViewRecord> views);
 
 }  // namespace eigenpose

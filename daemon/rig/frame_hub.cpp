@@ -21,27 +21,40 @@ std::string words(const std::exception_ptr& failure) {
   }
 }
 
-/// Counts one up while it lives; the count's lock is held at both ends.
-class Waiting {
- public:
-  explicit Waiting(int& count) : count_(count) { ++count_; }
-  Waiting(const Waiting&) = delete;
-  Waiting& operator=(const Waiting&) = delete;
-  ~Waiting() { --count_; }
-
- private:
-  int& count_;
-};
+/// Between two beats of the camera's thread; opening a camera and its first frame take longer.
+constexpr std::chrono::seconds camera_turn_limit{10};
+constexpr std::chrono::seconds open_allowance{60};
+/// A wait on the condition is looked through so often, in case the camera's thread wakes nobody.
+constexpr std::chrono::milliseconds frame_wait_step{200};
+constexpr std::chrono::seconds longest_wait{1};
 
 }  // namespace
 
-FrameHub::FrameHub(OpenCamera open, const Clock& clock) : open_(std::move(open)), clock_(clock) {
+/// One `exposed_after` under way: the camera must look until its frame has come. The hub's mutex is held
+/// where it is made and where it ends.
+class FrameHub::Demand {
+ public:
+  Demand(std::multiset<TimePoint>& demands, TimePoint since)
+      : demands_(demands), place_(demands.insert(since)) {}
+  Demand(const Demand&) = delete;
+  Demand& operator=(const Demand&) = delete;
+  ~Demand() { demands_.erase(place_); }
+
+ private:
+  std::multiset<TimePoint>& demands_;
+  std::multiset<TimePoint>::iterator place_;
+};
+
+FrameHub::FrameHub(OpenCamera open, const Clock& clock, Heartbeat& heartbeat, OnChange on_change)
+    : open_(std::move(open)), clock_(clock), on_change_(std::move(on_change)) {
   status_.configured = static_cast<bool>(open_);
-  if (open_)
+  if (open_) {
+    pulse_ = heartbeat.join("camera", camera_turn_limit);
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
-  else
-    report_trouble(std::make_exception_ptr(
+  } else {
+    report_failure(std::make_exception_ptr(
         DeviceError("camera", "take a picture", "there is none: add [camera] to the configuration")));
+  }
 }
 
 FrameHub::~FrameHub() = default;
@@ -66,57 +79,57 @@ std::optional<Frame> FrameHub::latest() const {
 
 Frame FrameHub::exposed_after(TimePoint since, TimePoint deadline, std::stop_token stop) const {
   std::unique_lock lock(mutex_);
-  const Waiting waiting(waiting_);
+  const Demand demand(demands_, since);
   changed_.notify_all();
-  std::uint64_t seen_frames = 0;
-  std::uint64_t seen_troubles = 0;
   for (;;) {
     if (stop.stop_requested()) throw Interrupted();
-    if (frame_ && !trouble_ && frame_->exposure_start >= since) return *frame_;
-    if (!open_ || (trouble_ && clock_.now() >= deadline)) std::rethrow_exception(trouble_);
+    if (frame_ && !failure_ && frame_->exposure_start >= since) return *frame_;
+    if (!open_ || (failure_ && clock_.now() >= deadline)) std::rethrow_exception(failure_);
     if (clock_.now() >= deadline)
       throw DeviceTimeout(status_.info ? status_.info->name : "camera", "take a picture",
                           "no frame was exposed after the axes came to rest");
-    seen_frames = frames_;
-    seen_troubles = troubles_;
-    // The camera's thread wakes us with every frame and every failure, so no deadline is needed here.
-    changed_.wait(lock, stop, [&] { return frames_ != seen_frames || troubles_ != seen_troubles; });
+    const std::uint64_t frames = frames_;
+    const std::uint64_t failures = failures_;
+    changed_.wait_for(lock, stop, frame_wait_step,
+                      [&] { return frames_ != frames || failures_ != failures; });
   }
 }
 
 std::optional<Frame> FrameHub::next(std::uint64_t& cursor, std::stop_token stop) const {
   std::unique_lock lock(mutex_);
-  const std::uint64_t troubles = troubles_;
-  const bool woken = changed_.wait(lock, stop, [&] { return frames_ > cursor || troubles_ != troubles; });
-  if (!woken || frames_ <= cursor) return std::nullopt;
+  const std::uint64_t failures = failures_;
+  changed_.wait_for(lock, stop, longest_wait, [&] { return frames_ > cursor || failures_ != failures; });
+  if (stop.stop_requested() || frames_ <= cursor) return std::nullopt;
   cursor = frames_;
   return frame_;
 }
 
 CameraStatus FrameHub::status() const {
   const std::lock_guard lock(mutex_);
-  return status_;
+  CameraStatus status = status_;
+  if (frame_) {
+    status.frame_sequence = frame_->sequence;
+    status.frame_age = clock_.now() - frame_->exposure_start;
+  }
+  return status;
+}
+
+bool FrameHub::frame_is_wanted() const {
+  if (on_demand_ == 0) return true;
+  if (demands_.empty()) return false;
+  return failure_ || !frame_ || frame_->exposure_start < *demands_.rbegin();
 }
 
 void FrameHub::run(const std::stop_token& stop) {
   std::unique_ptr<Camera> camera;
   while (!stop.stop_requested()) {
+    pulse_.beat();
     {
       std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop, [this] { return on_demand_ == 0 || waiting_ > 0; })) return;
+      if (!changed_.wait_for(lock, stop, longest_wait, [this] { return frame_is_wanted(); })) continue;
     }
     try {
-      if (!camera) {
-        camera = open_();
-        const std::lock_guard lock(mutex_);
-        status_.info = camera->info();
-      }
-      Frame frame = camera->next_frame(clock_.now() + frame_timeout, stop);
-      {
-        const std::lock_guard lock(mutex_);
-        status_.statistics = camera->statistics();
-      }
-      publish(std::move(frame));
+      fetch(camera, stop);
     } catch (const Interrupted&) {
       return;
     } catch (const std::exception&) {
@@ -124,38 +137,61 @@ void FrameHub::run(const std::stop_token& stop) {
         const std::lock_guard lock(mutex_);
         status_.statistics = camera->statistics();  // it may fail because every frame is damaged
       }
-      report_trouble(std::current_exception());
+      report_failure(std::current_exception());
       clock_.sleep_for(retry_pause, stop);
     }
   }
 }
 
-void FrameHub::publish(Frame frame) {
-  bool recovered = false;
+void FrameHub::fetch(std::unique_ptr<Camera>& camera, const std::stop_token& stop) {
+  if (!camera) {
+    pulse_.beat(open_allowance);
+    camera = open_();
+    const std::lock_guard lock(mutex_);
+    status_.info = camera->info();
+  }
+  // A camera that was lost is looked for and opened again within this call.
+  pulse_.beat(open_allowance);
+  Frame frame = camera->next_frame(clock_.now() + frame_timeout, stop);
   {
     const std::lock_guard lock(mutex_);
-    recovered = static_cast<bool>(trouble_);
-    trouble_ = nullptr;
+    status_.statistics = camera->statistics();
+  }
+  publish(std::move(frame));
+}
+
+void FrameHub::publish(Frame frame) {
+  bool found = false;
+  {
+    const std::lock_guard lock(mutex_);
+    found = failure_ || !frame_;
+    failure_ = nullptr;
     status_.error.reset();
     frame_ = std::move(frame);
     ++frames_;
   }
   changed_.notify_all();
-  if (recovered) spdlog::info("event=camera_recovered");
+  if (!found) return;
+  spdlog::info("event=camera_found");
+  if (on_change_) on_change_(std::nullopt);
 }
 
-void FrameHub::report_trouble(const std::exception_ptr& failure) {
+void FrameHub::report_failure(const std::exception_ptr& failure) {
   const std::string text = words(failure);
+  bool lost = false;
   bool fresh = false;
   {
     const std::lock_guard lock(mutex_);
+    lost = !failure_;
     fresh = status_.error != text;
-    trouble_ = failure;
+    failure_ = failure;
     status_.error = text;
-    ++troubles_;
+    ++failures_;
   }
   changed_.notify_all();
-  if (fresh && open_) spdlog::error("event=camera_failed error=\"{}\"", text);
+  if (!open_) return;
+  if (fresh) spdlog::error("event=camera_failed error=\"{}\"", text);
+  if (lost && on_change_) on_change_(text);
 }
 
 }  // namespace eigenpose

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "daemon/service/errors.h"
 
@@ -27,6 +28,9 @@ struct AcquisitionResult {
   std::filesystem::path folder;  ///< of the image set
   std::size_t views = 0;         ///< of the plan
   std::size_t kept = 0;          ///< of these, taken by an earlier, interrupted run
+  std::size_t retaken = 0;       ///< pictures thrown away because an axis moved meanwhile
+  /// Why an axis does not stand where it stood before; the set is complete all the same.
+  std::optional<std::string> not_returned;
 };
 
 /// What learning has made.
@@ -36,7 +40,8 @@ struct LearningResult {
   std::size_t components = 0;
   double energy = 0.0;  ///< share of the views' energy that the components keep, 0…1
   std::chrono::duration<double> time{};
-  std::filesystem::path file;  ///< of the model
+  std::filesystem::path file;         ///< of the model
+  std::vector<std::string> left_out;  ///< image sets that are incomplete or cannot be read
 };
 
 /// Nothing until the job is done.

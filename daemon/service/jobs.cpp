@@ -39,12 +39,12 @@ std::string_view job_state_name(JobState state) {
   return "failed";
 }
 
-Jobs::Jobs(EventSink& events)
-    : Jobs(events,
+Jobs::Jobs(EventSink& events, Heartbeat& heartbeat)
+    : Jobs(events, heartbeat,
            [](std::function<void(const std::stop_token&)> body) { return std::jthread(std::move(body)); }) {}
 
-Jobs::Jobs(EventSink& events, StartThread start_thread)
-    : events_(events), start_thread_(std::move(start_thread)) {}
+Jobs::Jobs(EventSink& events, Heartbeat& heartbeat, StartThread start_thread)
+    : events_(events), heartbeat_(heartbeat), start_thread_(std::move(start_thread)) {}
 
 Jobs::~Jobs() {
   const std::lock_guard lock(mutex_);
@@ -90,10 +90,18 @@ void Jobs::run(Job& job, const Work& work, const std::stop_token& stop) {
     const std::lock_guard lock(job.mutex);
     started = job.status;
   }
+  // An acquisition is the rig's work, and the rig beats itself.
+  Heartbeat::Pulse pulse;
+  if (started.kind == JobKind::learn) pulse = heartbeat_.join("job " + started.id, job_step_limit);
   events_.publish(JobChanged{std::move(started)});
   Context context;
   context.stop = stop;
-  context.progress = [&job](const ProgressUpdate& update) {
+  std::mutex pulse_mutex;  // progress comes from several threads
+  context.progress = [&](const ProgressUpdate& update) {
+    {
+      const std::lock_guard lock(pulse_mutex);
+      pulse.beat();
+    }
     const std::lock_guard lock(job.mutex);
     job.status.stage = update.stage;
     job.status.done = update.done;

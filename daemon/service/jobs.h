@@ -2,6 +2,7 @@
 
 /// Long work that clients start, watch and cancel.
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -14,10 +15,14 @@
 #include <vector>
 
 #include "core/base/progress.h"
+#include "daemon/rig/heartbeat.h"
 #include "daemon/service/events.h"
 #include "daemon/service/job_status.h"
 
 namespace eigenpose {
+
+/// Between two reports of a job's progress. The longest step without one is the eigen-solve of a large set.
+inline constexpr std::chrono::minutes job_step_limit{30};
 
 /// Runs jobs, each on a thread of its own, one of each kind at a time. Remembers the last hundred.
 /// Thread-safe.
@@ -36,9 +41,9 @@ class Jobs {
   /// Starts a thread that runs the body. @throws std::system_error when the system has none left.
   using StartThread = std::function<std::jthread(std::function<void(const std::stop_token&)>)>;
 
-  /// @param events hears of each start and end; outlives the jobs.
-  explicit Jobs(EventSink& events);
-  Jobs(EventSink& events, StartThread start_thread);
+  /// @param events hears of each start and end. Both outlive the jobs.
+  Jobs(EventSink& events, Heartbeat& heartbeat);
+  Jobs(EventSink& events, Heartbeat& heartbeat, StartThread start_thread);
   Jobs(const Jobs&) = delete;
   Jobs& operator=(const Jobs&) = delete;
   /// Cancels what runs and waits for it.
@@ -66,6 +71,7 @@ class Jobs {
   void forget_old();
 
   EventSink& events_;
+  Heartbeat& heartbeat_;
   const StartThread start_thread_;
   mutable std::mutex mutex_;
   std::map<std::uint64_t, std::shared_ptr<Job>> jobs_;  ///< guarded by mutex_

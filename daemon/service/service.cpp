@@ -8,36 +8,55 @@
 
 #include "core/base/error.h"
 #include "core/dataset/image_set.h"
-#include "daemon/rig/acquisition.h"
+#include "core/dataset/natural_order.h"
 
 namespace eigenpose {
 namespace {
 
 constexpr int max_components = 1024;
 
-/// The complete image sets, or those that are named.
-std::vector<ImageSet> learning_sets(const std::filesystem::path& folder,
-                                    const std::vector<std::string>& wanted) {
+/// The image sets to learn, and those that are left out.
+struct ChosenSets {
   std::vector<ImageSet> sets;
-  std::size_t named = 0;
-  for (ImageSet& set : open_image_sets(folder)) {
-    const bool is_named = std::find(wanted.begin(), wanted.end(), set.object()) != wanted.end();
-    named += is_named ? 1 : 0;
-    if (!wanted.empty() && !is_named) continue;
-    if (set.complete())
-      sets.push_back(std::move(set));
-    else if (is_named)
-      throw ServiceError(Fault::conflict, "the image set of \"" + set.object() + "\" is incomplete",
-                         "acquire it again: it continues where it was");
-    else
-      spdlog::warn("event=set_left_out object={} reason=incomplete", set.object());
+  std::vector<std::string> left_out;
+};
+
+[[noreturn]] void refuse_named_set(const CatalogEntry& entry) {
+  if (!entry.set)
+    throw ServiceError(Fault::conflict, "the image set of \"" + entry.object + "\" cannot be read",
+                       entry.error);
+  throw ServiceError(Fault::conflict, "the image set of \"" + entry.object + "\" is incomplete",
+                     "acquire it again: it continues where it was");
+}
+
+/// The complete image sets, or those that are named. @throws ServiceError (not_found, conflict).
+ChosenSets choose_sets(const std::vector<CatalogEntry>& entries, const std::vector<std::string>& wanted) {
+  ChosenSets chosen;
+  for (const std::string& name : wanted)
+    if (std::none_of(entries.begin(), entries.end(), [&](const auto& entry) { return entry.object == name; }))
+      throw ServiceError(Fault::not_found, "there is no image set of \"" + name + "\"",
+                         "ask for the objects there are");
+  for (const CatalogEntry& entry : entries) {
+    const bool named = std::find(wanted.begin(), wanted.end(), entry.object) != wanted.end();
+    if (!wanted.empty() && !named) continue;
+    if (entry.set && entry.set->complete()) {
+      chosen.sets.push_back(*entry.set);
+      continue;
+    }
+    if (named) refuse_named_set(entry);
+    chosen.left_out.push_back(entry.object);
   }
-  if (named < wanted.size())
-    throw ServiceError(Fault::not_found, "an object that was named has no image set",
-                       "ask for the objects there are");
-  if (sets.empty())
+  std::sort(chosen.sets.begin(), chosen.sets.end(),
+            [](const ImageSet& a, const ImageSet& b) { return NaturalLess()(a.object(), b.object()); });
+  if (chosen.sets.empty())
     throw ServiceError(Fault::conflict, "no image set is complete yet", "acquire an object first");
-  return sets;
+  return chosen;
+}
+
+/// Whether colour cannot be learned because a set has grey views.
+bool is_grey(const std::vector<ImageSet>& sets) {
+  return std::any_of(sets.begin(), sets.end(),
+                     [](const ImageSet& set) { return !set.views().empty() && set.load(0).channels() == 1; });
 }
 
 std::vector<Dof> dofs_of(const std::vector<RigAxis>& axes) {
@@ -60,15 +79,23 @@ std::string_view service_state_name(ServiceState state) {
   return "idle";
 }
 
-Service::Service(ServiceOptions options, ServiceDevices devices, EventSink& events, const Clock& clock)
+Service::Service(ServiceOptions options, ServiceDevices devices, EventSink& events, Heartbeat& heartbeat,
+                 const Clock& clock)
     : options_(std::move(options)),
       clock_(clock),
       dofs_(dofs_of(devices.axes)),
       models_(options_.model_file),
-      rig_(std::move(devices.axes), std::move(devices.lamps), clock),
-      camera_(std::move(devices.camera), clock),
-      watcher_(options_.watch, camera_, models_, events),
-      jobs_(events) {
+      image_sets_(options_.image_sets, heartbeat),
+      rig_(std::move(devices.axes), std::move(devices.lamps), clock, heartbeat),
+      camera_(std::move(devices.camera), clock, heartbeat,
+              [&events](const std::optional<std::string>& error) {
+                if (error)
+                  events.publish(CameraLost{*error});
+                else
+                  events.publish(CameraFound{});
+              }),
+      watcher_(options_.watch, camera_, models_, events, heartbeat),
+      jobs_(events, heartbeat) {
   models_.load();
 }
 
@@ -87,23 +114,59 @@ JobStatus Service::acquire(const std::string& object, const std::string& plan_na
                      names.empty() ? "add a [[plan]] to the configuration" : "plans: " + names);
 }
 
+void Service::refuse_set_in_the_way(const std::string& object, const Workspace& workspace) {
+  const std::optional<CatalogEntry> there = image_sets_.look_up(object);
+  if (!there) return;
+  const std::string hint = "remove the set, or give the object another name";
+  if (!there->set)
+    throw ServiceError(Fault::conflict, "the image set of \"" + object + "\" cannot be read: " + there->error,
+                       hint);
+  if (there->set->complete())
+    throw ServiceError(Fault::conflict, "the image set of \"" + object + "\" is complete already", hint);
+  if (there->set->workspace() != workspace)
+    throw ServiceError(Fault::conflict,
+                       "the unfinished image set of \"" + object + "\" has other axes than this plan",
+                       "continue it with its own plan, or " + hint);
+}
+
 JobStatus Service::start_acquisition(const std::string& object, Plan plan) {
+  try {
+    check_object_name(object);
+  } catch (const std::invalid_argument& error) {
+    throw ServiceError(Fault::invalid_request, error.what(), "choose another name");
+  }
   AcquisitionRequest request{object, std::move(plan), {}, options_.image_sets};
   request.workspace = plan_workspace(request.plan, dofs_);
-  return jobs_.start(
-      JobKind::acquire, object, [this, request = std::move(request)](const Jobs::Context& job) {
-        const Watcher::Pause pause(watcher_);
-        AcquisitionReport report;
-        try {
-          eigenpose::acquire(request, rig_, camera_, clock_, report, job.progress, job.stop);
-        } catch (...) {
-          if (!report.folder.empty())
-            job.add_hint(fmt::format("{} of {} views are kept in {}: the same acquisition continues there",
-                                     report.kept + report.taken, report.total, report.folder.string()));
-          throw;
-        }
-        return AcquisitionResult{report.folder, report.total, report.kept};
-      });
+  if (!jobs_.running(JobKind::acquire)) refuse_set_in_the_way(object, request.workspace);
+  return jobs_.start(JobKind::acquire, object,
+                     [this, request = std::move(request)](const Jobs::Context& job) {
+                       return run_acquisition(request, job);
+                     });
+}
+
+JobResult Service::run_acquisition(const AcquisitionRequest& request, const Jobs::Context& job) {
+  const Watcher::Pause pause(watcher_);
+  AcquisitionReport report;
+  try {
+    eigenpose::acquire(request, {rig_, camera_, clock_}, report, job.progress, job.stop);
+  } catch (...) {
+    if (!report.folder.empty())
+      job.add_hint(fmt::format("{} of {} views are kept in {}: the same acquisition continues there",
+                               report.kept + report.taken, report.total, report.folder.string()));
+    image_sets_.look_up(request.object);
+    throw;
+  }
+  image_sets_.look_up(request.object);
+  return AcquisitionResult{report.folder, report.total, report.kept, report.retaken, report.not_returned};
+}
+
+void Service::refuse_what_cannot_be_learned(const std::vector<std::string>& objects) {
+  try {
+    (void)choose_sets(image_sets_.entries(), objects);
+  } catch (const ServiceError&) {
+    // Perhaps what is kept is a few seconds old: the files decide.
+    (void)choose_sets(image_sets_.refresh(), objects);
+  }
 }
 
 JobStatus Service::learn(const LearnRequest& request) {
@@ -114,36 +177,57 @@ JobStatus Service::learn(const LearnRequest& request) {
                          fmt::format("allowed: 1 to {}", max_components));
     options.solver.components = static_cast<std::size_t>(*request.components);
   }
-  return jobs_.start(
-      JobKind::learn, "", [this, options, wanted = request.objects](const Jobs::Context& job) -> JobResult {
-        const std::vector<ImageSet> sets = learning_sets(options_.image_sets, wanted);
-        LearningReport report;
-        const auto model = std::make_shared<const Model>(
-            eigenpose::learn(all_views(sets), options, &report, job.progress, job.stop));
-        models_.replace(model);
-        const LearningResult result{model->objects.size(), report.views,      report.solver.components,
-                                    report.solver.energy,  report.total_time, models_.file()};
-        spdlog::info("event=model_learned objects={} views={} components={} energy={:.4f} seconds={:.2f}",
-                     result.objects, result.views, result.components, result.energy, result.time.count());
-        return result;
-      });
+  refuse_what_cannot_be_learned(request.objects);
+  return jobs_.start(JobKind::learn, "",
+                     [this, options = std::move(options), wanted = request.objects](
+                         const Jobs::Context& job) { return run_learning(options, wanted, job); });
+}
+
+JobResult Service::run_learning(LearningOptions options, const std::vector<std::string>& wanted,
+                                const Jobs::Context& job) {
+  ChosenSets chosen = choose_sets(image_sets_.refresh(), wanted);
+  if (options.normalization.color && options.normalization.type.empty() && is_grey(chosen.sets)) {
+    spdlog::info("event=learning_grey reason=\"a set has grey views\"");
+    options.normalization.color = false;
+  }
+  for (const std::string& object : chosen.left_out) spdlog::warn("event=set_left_out object={}", object);
+  LearningReport report;
+  std::shared_ptr<const Model> model;
+  try {
+    model = std::make_shared<const Model>(
+        eigenpose::learn(all_views(chosen.sets), options, &report, job.progress, job.stop));
+  } catch (const std::invalid_argument& error) {
+    // Views and options do not suit each other; which of them is wrong only the operator knows.
+    throw ServiceError(Fault::conflict, error.what(),
+                       "change [learn] in the configuration, or the image sets");
+  }
+  models_.replace(model);
+  LearningResult result{model->objects.size(),     report.views,      report.solver.components,
+                        report.solver.energy,      report.total_time, models_.file(),
+                        std::move(chosen.left_out)};
+  spdlog::info("event=model_learned objects={} views={} components={} energy={:.4f} seconds={:.2f}",
+               result.objects, result.views, result.components, result.energy, result.time.count());
+  return result;
+}
+
+void Service::stop_motion() noexcept {
+  rig_.stop_motion();
+  try {
+    if (const auto job = jobs_.running(JobKind::acquire)) jobs_.cancel(job->id);
+  } catch (const std::exception& error) {
+    spdlog::error("event=cancel_failed error=\"{}\"", error.what());
+  }
 }
 
 std::vector<ObjectStatus> Service::objects() const {
   std::map<std::string, ObjectStatus> found;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(options_.image_sets, error)) {
-    if (!std::filesystem::exists(entry.path() / "set.json")) continue;
-    ObjectStatus object;
-    object.name = entry.path().filename().string();
-    try {
-      const ImageSet set = ImageSet::open(entry.path());
-      object.name = set.object();
-      object.acquired = ObjectStatus::Acquired{set.views().size(), set.complete()};
-    } catch (const Error& trouble) {
-      object.trouble = trouble.what();
-    }
-    found[object.name] = object;
+  for (const CatalogEntry& entry : image_sets_.entries()) {
+    ObjectStatus& object = found[entry.object];
+    object.name = entry.object;
+    if (entry.set)
+      object.acquired = ObjectStatus::Acquired{entry.set->views().size(), entry.set->complete()};
+    else
+      object.error = entry.error;
   }
   if (const auto model = models_.current()) {
     for (std::size_t i = 0; i < model->objects.size(); ++i) {
@@ -157,18 +241,26 @@ std::vector<ObjectStatus> Service::objects() const {
   return result;
 }
 
-Frame Service::newest_frame() const {
+NewestFrame Service::newest_frame() const {
   std::optional<Frame> frame = camera_.latest();
+  const std::optional<std::string> error = camera_.status().error;
+  const std::string hint = "`eigenpose status` shows the camera; try again when it runs";
   if (!frame)
-    throw ServiceError(Fault::unavailable,
-                       camera_.status().error.value_or("the camera has not taken a picture yet"),
-                       "`eigenpose status` shows the camera; try again when it runs");
-  return *std::move(frame);
+    throw ServiceError(Fault::unavailable, error.value_or("the camera has not taken a picture yet"), hint);
+  const Duration age = clock_.now() - frame->exposure_start;
+  if (age > options_.stale_frame)
+    throw ServiceError(
+        Fault::unavailable,
+        fmt::format("the newest frame is {:.0f} s old{}{}", std::chrono::duration<double>(age).count(),
+                    error ? ": " : "", error.value_or("")),
+        hint);
+  return {*std::move(frame), age};
 }
 
-ServiceState Service::state() const {
-  if (jobs_.running(JobKind::acquire)) return ServiceState::acquiring;
-  return options_.watch.enabled && models_.current() ? ServiceState::watching : ServiceState::idle;
+ServiceActivity Service::activity() const {
+  if (const auto job = jobs_.running(JobKind::acquire)) return {ServiceState::acquiring, job->started};
+  const bool watches = options_.watch.enabled && models_.current();
+  return {watches ? ServiceState::watching : ServiceState::idle, started_};
 }
 
 }  // namespace eigenpose

@@ -2,18 +2,39 @@
 
 #include <exception>
 #include <span>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 
 namespace eigenpose {
+namespace {
+
+/// Between two beats of the watcher's thread: a frame with much clutter takes seconds to recognise, and a
+/// model of many objects to take up.
+constexpr std::chrono::seconds watcher_look_limit{90};
+
+}  // namespace
 
 Watcher::Watcher(const WatcherOptions& options, const FrameHub& camera, const ModelStore& models,
-                 EventSink& events)
+                 EventSink& events, Heartbeat& heartbeat)
     : camera_(camera), models_(models), events_(events), scene_(options.scene) {
-  if (options.enabled) thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  if (!options.enabled) return;
+  pulse_ = heartbeat.join("watcher", watcher_look_limit);
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 Watcher::~Watcher() = default;
+
+Watcher::Pause::Pause(Watcher& watcher) : watcher_(watcher) {
+  const std::lock_guard lock(watcher_.looking_);
+  ++watcher_.pauses_;
+}
+
+Watcher::Pause::~Pause() {
+  const std::lock_guard lock(watcher_.looking_);
+  --watcher_.pauses_;
+  watcher_.look_anew_ = true;
+}
 
 WatchStatus Watcher::status() const {
   const std::lock_guard lock(mutex_);
@@ -23,21 +44,27 @@ WatchStatus Watcher::status() const {
 void Watcher::run(const std::stop_token& stop) {
   std::uint64_t cursor = 0;
   while (!stop.stop_requested()) {
+    pulse_.beat();
     const std::optional<Frame> frame = camera_.next(cursor, stop);
     if (!frame) continue;
-    if (pauses_ > 0) {
+    const std::lock_guard lock(looking_);
+    if (pauses_ > 0) continue;
+    if (std::exchange(look_anew_, false)) {
       scene_.reset();
-      told_settled_ = false;
-      continue;
+      settled_reported_ = false;
     }
     try {
       look(*frame);
     } catch (const std::exception& error) {
-      const std::lock_guard lock(mutex_);
-      if (status_.error != error.what()) spdlog::error("event=recognition_failed error=\"{}\"", error.what());
-      status_.error = error.what();
+      note_failure(error);
     }
   }
+}
+
+void Watcher::note_failure(const std::exception& error) {
+  const std::lock_guard lock(mutex_);
+  if (status_.error != error.what()) spdlog::error("event=recognition_failed error=\"{}\"", error.what());
+  status_.error = error.what();
 }
 
 void Watcher::look(const Frame& frame) {
@@ -48,9 +75,9 @@ void Watcher::look(const Frame& frame) {
   }
   if (auto model = models_.current(); model != model_) use_model(std::move(model));
   if (!recognizer_) return;
-  if (seen.settled && (seen.changed || !told_settled_ || fresh_model_))
+  if (seen.settled && (seen.changed || !settled_reported_ || fresh_model_))
     report_settled(frame);
-  else if (!seen.settled && seen.changed && told_settled_)
+  else if (!seen.settled && seen.changed && settled_reported_)
     report_change(frame);
 }
 
@@ -62,7 +89,7 @@ void Watcher::use_model(std::shared_ptr<const Model> model) {
 }
 
 void Watcher::report_change(const Frame& frame) {
-  told_settled_ = false;
+  settled_reported_ = false;
   SceneResult result;
   result.state = SceneResult::State::changing;
   result.frame = {frame.sequence, frame.exposure_start};
@@ -73,7 +100,7 @@ void Watcher::report_change(const Frame& frame) {
 void Watcher::report_settled(const Frame& frame) {
   // Whatever happens below, this scene has been looked at: a failure is reported once, not with every frame.
   scene_.accept();
-  told_settled_ = true;
+  settled_reported_ = true;
   fresh_model_ = false;
   SceneResult result;
   result.frame = {frame.sequence, frame.exposure_start};

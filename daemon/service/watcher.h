@@ -2,9 +2,8 @@
 
 /// Watching: from frames to results, on a thread of its own.
 
-#include <atomic>
-#include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "core/image/scene_change.h"
 #include "core/recognition/recognizer.h"
 #include "daemon/rig/frame_hub.h"
+#include "daemon/rig/heartbeat.h"
 #include "daemon/service/events.h"
 #include "daemon/service/model_store.h"
 
@@ -31,24 +31,26 @@ struct WatchStatus {
   std::optional<std::string> error;  ///< why the last one could not be
 };
 
-/// Looks at the newest frame, always: when the picture changes it says so once; when it has settled it
+/// Looks at the newest frame, always: when the picture changes it publishes that once; when it has settled it
 /// recognises what stands there and publishes the result; a new model looks at the standing scene anew.
 /// Nothing is published without a model, nor while paused. Thread-safe.
 class Watcher {
  public:
-  /// Starts the thread, if enabled. Camera, models and events outlive the watcher.
-  Watcher(const WatcherOptions& options, const FrameHub& camera, const ModelStore& models, EventSink& events);
+  /// Starts the thread, if enabled. All references outlive the watcher.
+  Watcher(const WatcherOptions& options, const FrameHub& camera, const ModelStore& models, EventSink& events,
+          Heartbeat& heartbeat);
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
   ~Watcher();
 
-  /// While the rig moves on its own account nothing is watched. Pauses add up.
+  /// Nothing is looked at or published while one lives: the rig moves on its own account. Making one waits
+  /// for the look in progress.
   class Pause {
    public:
-    explicit Pause(Watcher& watcher) : watcher_(watcher) { ++watcher_.pauses_; }
+    explicit Pause(Watcher& watcher);
     Pause(const Pause&) = delete;
     Pause& operator=(const Pause&) = delete;
-    ~Pause() { --watcher_.pauses_; }
+    ~Pause();
 
    private:
     Watcher& watcher_;
@@ -62,20 +64,24 @@ class Watcher {
   void report_change(const Frame& frame);
   void report_settled(const Frame& frame);
   void use_model(std::shared_ptr<const Model> model);
+  void note_failure(const std::exception& error);
 
   const FrameHub& camera_;
   const ModelStore& models_;
   EventSink& events_;
-  std::atomic<int> pauses_{0};
+  Heartbeat::Pulse pulse_;  ///< beaten on the watcher's thread
+  std::mutex looking_;      ///< held while a frame is looked at
+  int pauses_ = 0;          ///< guarded by looking_
+  bool look_anew_ = false;  ///< guarded by looking_: there was a pause since the last look
   mutable std::mutex mutex_;
   WatchStatus status_;  ///< guarded by mutex_
   // The rest is touched on the watcher's thread only.
   SceneChange scene_;
   std::shared_ptr<const Model> model_;
   std::optional<Recognizer> recognizer_;
-  bool fresh_model_ = false;   ///< the standing scene has not been looked at with it
-  bool told_settled_ = false;  ///< the last result says what stands there
-  std::jthread thread_;        ///< last: ends before the rest goes
+  bool fresh_model_ = false;       ///< the standing scene has not been looked at with it
+  bool settled_reported_ = false;  ///< the last result published says what stands there
+  std::jthread thread_;            ///< last: ends before the rest goes
 };
 
 }  // namespace eigenpose

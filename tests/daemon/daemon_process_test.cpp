@@ -1,10 +1,14 @@
 /// eigenposed as a program: starts, answers, refuses a second one, and stops cleanly.
 
+#include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -12,6 +16,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include "core/base/clock.h"
 #include "daemon/api/client/api_client.h"
@@ -85,6 +92,49 @@ TEST_F(DaemonProcess, ASecondOneIsRefusedAndTheFirstGoesOn) {
   EXPECT_EQ(second.wait(), 1);
   EXPECT_THAT(text_of(second_log), HasSubstr("another eigenposed answers on this socket: stop it first"));
   EXPECT_NO_THROW(status_once_ready());
+}
+
+TEST_F(DaemonProcess, ASecondOneWithTheSameStateFolderIsRefusedAndNamesTheFirst) {
+  Program first(EIGENPOSED, arguments(), log_);
+  status_once_ready();
+  const std::filesystem::path second_log = folder_.path() / "second";
+  std::vector<std::string> elsewhere = arguments();
+  elsewhere[3] = (folder_.path() / "run2").string();
+  Program second(EIGENPOSED, elsewhere, second_log);
+  EXPECT_EQ(second.wait(), 1);
+  EXPECT_THAT(text_of(second_log),
+              AllOf(HasSubstr("another eigenposed (process " + std::to_string(first.process()) + ")"),
+                    HasSubstr(state_.string())));
+  EXPECT_NO_THROW(status_once_ready());
+}
+
+TEST_F(DaemonProcess, FeedsTheWatchdogAndReportsItsStartAndItsStop) {
+  const std::filesystem::path path = folder_.path() / "notify";
+  const int notified = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  ASSERT_EQ(::bind(notified, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  ::setenv("NOTIFY_SOCKET", path.c_str(), 1);
+  ::setenv("WATCHDOG_USEC", "300000", 1);
+  Program daemon(EIGENPOSED, arguments(), log_);
+  ::unsetenv("NOTIFY_SOCKET");
+  ::unsetenv("WATCHDOG_USEC");
+  const auto wait_for = [&](const std::string& wanted) {
+    std::array<char, 256> bytes{};
+    for (;;) {
+      const ssize_t count = ::recv(notified, bytes.data(), bytes.size(), 0);
+      if (std::string_view(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(0, count))) == wanted)
+        return;
+    }
+  };
+  wait_for("READY=1");
+  wait_for("WATCHDOG=1");
+  wait_for("WATCHDOG=1");
+  daemon.signal(SIGTERM);
+  wait_for("STOPPING=1");
+  EXPECT_EQ(daemon.wait(), 0) << log();
+  ::close(notified);
 }
 
 /// A rig whose table is a drive of its own, apart from the service that is tried with it.

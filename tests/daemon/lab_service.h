@@ -29,8 +29,9 @@ class LabService final : public EventSink {
     std::filesystem::create_directories(config_.daemon.runtime_dir);
     std::filesystem::create_directories(config_.daemon.state_dir);
     const Devices devices = make_devices(config_, clock_);
-    service_ = std::make_unique<Service>(
-        service_options(config_), ServiceDevices{devices.camera, devices.axes, devices.lamps}, *this, clock_);
+    service_ = std::make_unique<Service>(service_options(config_),
+                                         ServiceDevices{devices.camera, devices.axes, devices.lamps}, *this,
+                                         heartbeat_, clock_);
     if (config_.sim) lab_ = std::make_unique<sim::LabClient>(config_.lab_socket());
   }
   LabService(const LabService&) = delete;
@@ -87,6 +88,7 @@ class LabService final : public EventSink {
 
   test::TemporaryFolder folder_;
   SteadyClock clock_;
+  Heartbeat heartbeat_{clock_};
   Config config_;
   std::mutex mutex_;
   std::condition_variable published_;

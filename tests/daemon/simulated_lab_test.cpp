@@ -107,7 +107,7 @@ TEST(SimulatedLab, AnAbsentModbusServerEndsInAClearErrorAndNothingIsLost) {
   EXPECT_THAT(error_of(job), HasSubstr("table"));
   EXPECT_THAT(error_of(job), HasSubstr("127.0.0.1:1"));
   EXPECT_THAT(job.failure->hint, HasSubstr("has power and its cable"));
-  EXPECT_THAT(lab.service().rig().status()[0].error.value_or(""), HasSubstr("table"));
+  EXPECT_THAT(lab.service().rig().status().axes[0].error.value_or(""), HasSubstr("table"));
 }
 
 TEST(SimulatedLab, AModbusServerThatDiesInTheMiddleLosesNothingAndTheAcquisitionContinues) {
@@ -146,27 +146,12 @@ TEST(SimulatedLab, CancellingStopsTheTableAndKeepsWhatWasTaken) {
   EXPECT_EQ(lab.ended(id).state, JobState::cancelled);
   // The drive was told to stop and slows down; nobody sends it on to the next pose.
   while (lab.lab().truth().moving) std::this_thread::yield();
-  const Angle rest = lab.lab().truth().table;
-  EXPECT_EQ(lab.lab().truth().table, rest);
-  EXPECT_GE(ImageSet::open(lab.config().image_sets() / "duck").views().size(), 2U);
-}
-
-TEST(SimulatedLab, LearningWithoutACompleteSetSaysToAcquireFirst) {
-  LabService lab(small_lab + table_at("simulated"));
-  const JobStatus job = lab.learn();
-  EXPECT_EQ(job.state, JobState::failed);
-  EXPECT_THAT(error_of(job), HasSubstr(lab.config().image_sets().string()));
-}
-
-TEST(SimulatedLab, ADamagedModelIsToldAndLeftWhereItIs) {
-  test::TemporaryFolder folder;
-  const std::filesystem::path file = folder.path() / "model.h5";
-  std::ofstream(file) << "not a model";
-  ModelStore store(file);
-  store.load();
-  EXPECT_EQ(store.current(), nullptr);
-  EXPECT_THAT(store.error().value_or(""), HasSubstr(file.string()));
-  EXPECT_EQ(std::filesystem::file_size(file), 11U);
+  const ImageSet kept = ImageSet::open(lab.config().image_sets() / "duck");
+  EXPECT_GE(kept.views().size(), 2U);
+  EXPECT_LT(kept.views().size(), 24U);
+  // It stands short of the pose after the last one that was taken or under way: 15 degrees each.
+  const double rest_deg = lab.lab().truth().table.degrees();
+  EXPECT_LE(rest_deg, 15.0 * static_cast<double>(kept.views().size()) + 1.0);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ class Program {
     if (process_ > 0) ::kill(process_, SIGKILL);
     if (process_ > 0) wait();
   }
+  [[nodiscard]] pid_t process() const { return process_; }
   void signal(int number) const { ::kill(process_, number); }
   /// Waits for its end. @return its exit code, or 128 + the signal that ended it.
   int wait() {

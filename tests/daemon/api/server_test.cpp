@@ -3,6 +3,7 @@
 #include <cstring>
 #include <future>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -11,6 +12,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "core/base/clock.h"
 #include "daemon/api/client/api_client.h"
 #include "daemon/api/event_log.h"
 #include "tests/support/temporary_folder.h"
@@ -71,10 +73,17 @@ constexpr const char* get_last = "GET /hello HTTP/1.1\r\nHost: x\r\nConnection: 
 class ServerTest : public testing::Test {
  protected:
   void start(ServerOptions options = {}) {
-    server_ = std::make_unique<Server>(options, [this](const Request& request) -> Answer {
-      if (request.path == "/events") return EventStream{log_, "result", 0};
-      return Response{200, "text/plain", "hello from " + request.path + " " + request.body, {}};
-    });
+    server_ = std::make_unique<Server>(
+        options,
+        [this](const Request& request) -> Answer {
+          if (request.path == "/events") return EventStream{log_, "result", 0};
+          if (request.path == "/hang") {
+            entered_.set_value();
+            let_go_.get_future().wait();
+          }
+          return Response{200, "text/plain", "hello from " + request.path + " " + request.body, {}};
+        },
+        heartbeat_);
     wake_ = log_->subscribe([this] { server_->notify(); });
     server_->listen(socket_, Access::read);
     server_->start();
@@ -101,6 +110,9 @@ class ServerTest : public testing::Test {
   test::TemporaryFolder folder_;
   UnixSocket socket_{folder_.path() / "s.sock", 0600, ""};
   std::shared_ptr<EventLog> log_ = std::make_shared<EventLog>(8);
+  ManualClock clock_;  // of the heartbeat alone
+  Heartbeat heartbeat_{clock_};
+  std::promise<void> entered_, let_go_;
   std::unique_ptr<Server> server_;
   EventLog::Subscription wake_;
 };
@@ -245,6 +257,19 @@ TEST_F(ServerTest, StopsWithClientsConnected) {
   wake_ = {};
   server_.reset();
   EXPECT_EQ(half.read_all(), "");
+}
+
+TEST_F(ServerTest, IsOverdueWhileAHandlerHoldsItUpAndOnlyThen) {
+  start();
+  clock_.advance(std::chrono::seconds(16));
+  while (!heartbeat_.overdue().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  RawClient client(socket_.path());
+  client.send("GET /hang HTTP/1.1\r\nHost: x\r\n\r\n");
+  entered_.get_future().wait();
+  clock_.advance(std::chrono::seconds(16));
+  EXPECT_THAT(heartbeat_.overdue(), testing::ElementsAre("server"));
+  let_go_.set_value();
+  client.read_until("/hang");
 }
 
 TEST_F(ServerTest, TheClientReadsTheStreamAndStopsWhenItLikes) {

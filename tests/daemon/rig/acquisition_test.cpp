@@ -1,17 +1,19 @@
 #include "daemon/rig/acquisition.h"
 
+#include <fstream>
 #include <future>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/dataset/image_set.h"
 #include "tests/daemon/fakes.h"
 #include "tests/support/temporary_folder.h"
 
-namespace eigenpose {
+namespace eigenpose::acquisition_test {
 namespace {
 
 using testing::ElementsAre;
@@ -19,7 +21,7 @@ using testing::HasSubstr;
 
 const Dof table{"table", "deg", 0.0, 360.0, true};
 const Dof arm{"arm", "deg", -90.0, 90.0, false};
-constexpr std::chrono::milliseconds settle{15};
+constexpr std::chrono::milliseconds settle{5};
 
 RigAxis fake(const Dof& dof, FakeAxisRecord& record, const Clock& clock) {
   RigAxisOptions options;
@@ -38,11 +40,11 @@ class AcquisitionTest : public testing::Test {
   AcquisitionRequest turn(const std::string& object) {
     return request(object, {{"table", {}, Spacing{0, 360, 6}}});
   }
-  AcquisitionReport run(const AcquisitionRequest& what, std::stop_token stop = {}) {
+  AcquisitionReport run(const AcquisitionRequest& what, const std::stop_token& stop = {}) {
     AcquisitionReport report;
     report_ = {};
     try {
-      acquire(what, rig_, camera_, clock_, report, {}, std::move(stop));
+      acquire(what, {rig_, camera_, clock_}, report, {}, stop);
     } catch (...) {
       report_ = report;
       throw;
@@ -54,8 +56,14 @@ class AcquisitionTest : public testing::Test {
   SteadyClock clock_;
   FakeAxisRecord table_record_;
   FakeAxisRecord arm_record_;
-  Rig rig_{{fake(table, table_record_, clock_), fake(arm, arm_record_, clock_)}, {}, clock_};
-  FrameHub camera_{[this] { return std::make_unique<FakeCamera>(table_record_, settle, clock_); }, clock_};
+  Heartbeat heartbeat_{clock_};
+  FakeLampRecord lamp_record_;
+  Rig rig_{{fake(table, table_record_, clock_), fake(arm, arm_record_, clock_)},
+           {fake_lamp("key", 0.8, lamp_record_)},
+           clock_,
+           heartbeat_};
+  FrameHub camera_{[this] { return std::make_unique<FakeCamera>(table_record_, settle, clock_); }, clock_,
+                   heartbeat_};
   AcquisitionReport report_;
 };
 
@@ -73,9 +81,149 @@ TEST_F(AcquisitionTest, VisitsEveryPoseAndKeepsWhatTheCameraSawThere) {
   }
 }
 
-TEST_F(AcquisitionTest, ReturnsToTheFirstPoseAtTheEnd) {
+TEST_F(AcquisitionTest, ReturnsEachAxisToWhereItStoodBefore) {
+  set(table_record_, &FakeAxisRecord::position, 45.0);
+  set(arm_record_, &FakeAxisRecord::position, 10.0);
+  run(request("mug", {{"arm", {-30}, {}}, {"table", {0, 120}, {}}}));
+  EXPECT_THAT(table_record_.moves, ElementsAre(0, 120, 45));
+  EXPECT_THAT(arm_record_.moves, ElementsAre(-30, 10));
+}
+
+TEST_F(AcquisitionTest, ReturnsAnAxisThatWasNotHomedToTheFirstPose) {
+  set(table_record_, &FakeAxisRecord::homed, false);
+  set(table_record_, &FakeAxisRecord::position, 77.0);
+  run(request("mug", {{"table", {60, 120}, {}}}));
+  EXPECT_THAT(table_record_.moves, ElementsAre(60, 120, 60));
+}
+
+TEST_F(AcquisitionTest, AFailedReturnMoveLeavesTheSetCompleteAndIsReported) {
+  set(table_record_, &FakeAxisRecord::lost_from_move, 6);
+  const AcquisitionReport report = run(turn("mug"));
+  EXPECT_EQ(report.taken, 6U);
+  EXPECT_THAT(report.not_returned.value_or(""), HasSubstr("table: move: connection closed"));
+  EXPECT_TRUE(ImageSet::open(folder_.path() / "mug").complete());
+}
+
+TEST_F(AcquisitionTest, RecordsWhereEveryActuatorStoodAndThePoseReadBackOfEachView) {
+  set(table_record_, &FakeAxisRecord::position, 45.0);
+  set(table_record_, &FakeAxisRecord::on_frame, [](FakeAxisRecord& axis) {
+    if (axis.moves.size() == 2) axis.position = 60.25;  // within the tolerance of 60
+  });
   run(turn("mug"));
-  EXPECT_THAT(table_record_.moves, ElementsAre(0, 60, 120, 180, 240, 300, 0));
+  std::ifstream index(folder_.path() / "mug" / "set.json");
+  const nlohmann::json set = nlohmann::json::parse(index);
+  const nlohmann::json& actuators = set.at("source").at("actuators");
+  EXPECT_EQ(actuators.at("table_deg"), 45.0);
+  EXPECT_EQ(actuators.at("arm_deg"), 0.0);
+  EXPECT_TRUE(actuators.contains("key_level"));
+  std::ifstream journal(folder_.path() / "mug" / "views.jsonl");
+  std::string line;
+  std::getline(journal, line);
+  std::getline(journal, line);
+  const nlohmann::json second = nlohmann::json::parse(line);
+  EXPECT_EQ(second.at("q"), nlohmann::json({60.0}));
+  EXPECT_EQ(second.at("measured_q"), nlohmann::json({60.25}));
+}
+
+TEST_F(AcquisitionTest, AViewWhoseAxisMovedMeanwhileIsTakenAgain) {
+  set(table_record_, &FakeAxisRecord::on_frame, [pushed = false](FakeAxisRecord& axis) mutable {
+    if (axis.moves.size() != 3 || pushed) return;
+    axis.position += 30.0;
+    pushed = true;
+  });
+  const AcquisitionReport report = run(turn("mug"));
+  EXPECT_EQ(report.retaken, 1U);
+  EXPECT_EQ(report.taken, 6U);
+  EXPECT_THAT(table_record_.moves, ElementsAre(0, 60, 120, 120, 180, 240, 300, 0));
+  const ImageSet set = ImageSet::open(folder_.path() / "mug");
+  ASSERT_EQ(set.views().size(), 6U);
+  for (std::size_t i = 0; i < set.views().size(); ++i)
+    EXPECT_EQ(set.load(i).at<unsigned char>(0, 0), 6 * i) << "view " << i;
+}
+
+TEST_F(AcquisitionTest, AnAxisThatNeverStaysEndsTheRunAfterAFewTries) {
+  set(table_record_, &FakeAxisRecord::on_frame, [](FakeAxisRecord& axis) { axis.position += 30.0; });
+  AcquisitionRequest request = turn("mug");
+  request.most_retakes = 2;
+  try {
+    run(request);
+    FAIL() << "succeeded";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("table: hold its position: stood at 30 after the picture, not at 0"));
+    EXPECT_THAT(error.what(), HasSubstr("3 times"));
+  }
+  EXPECT_EQ(report_.retaken, 2U);
+  EXPECT_EQ(report_.taken, 0U) << "no picture of a wrong pose is kept";
+}
+
+TEST_F(AcquisitionTest, AnAlarmAfterThePictureEndsTheRunWithTheAlarm) {
+  set(table_record_, &FakeAxisRecord::on_frame, [](FakeAxisRecord& axis) { axis.alarm = "overload"; });
+  try {
+    run(turn("mug"));
+    FAIL() << "succeeded";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("overload"));
+  }
+  EXPECT_EQ(report_.taken, 0U);
+}
+
+TEST_F(AcquisitionTest, WithoutLightNothingMovesAndNothingIsTaken) {
+  lamp_record_.answers = false;
+  EXPECT_THROW(run(turn("mug")), DeviceTimeout);
+  EXPECT_TRUE(table_record_.moves.empty());
+  EXPECT_EQ(report_.taken, 0U);
+}
+
+TEST_F(AcquisitionTest, ALampThatFailsDuringTheRunEndsItAndTheViewInTheDarkIsNotKept) {
+  set(table_record_, &FakeAxisRecord::on_frame, [this](FakeAxisRecord& axis) {
+    if (axis.moves.size() == 3) lamp_record_.answers = false;
+  });
+  try {
+    run(turn("mug"));
+    FAIL() << "succeeded";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("key: set level: no answer"));
+  }
+  EXPECT_EQ(report_.taken, 2U);
+  EXPECT_EQ(ImageSet::open(folder_.path() / "mug").views().size(), 2U);
+}
+
+TEST_F(AcquisitionTest, TheCameraDoesNotRunFreeMeanwhile) {
+  int frames = 0;  // counted with the axis's lock held
+  set(table_record_, &FakeAxisRecord::on_frame,
+      [&](FakeAxisRecord& axis) { frames += axis.moves.empty() || axis.moves.size() > 6 ? 0 : 1; });
+  run(turn("mug"));
+  set(table_record_, &FakeAxisRecord::on_frame, nullptr);
+  // One a view, and one that may have been under way when the run began.
+  EXPECT_LE(frames, 7);
+}
+
+TEST(MissingPoses, AreThoseThatNoViewShowsInThePlansOrder) {
+  const std::vector<Dof> dofs = {arm, table};
+  const Plan plan = make_plan({"p", {{"arm", {-30, 30}, {}}, {"table", {0, 120, 240}, {}}}}, dofs);
+  const Workspace workspace = plan_workspace(plan, dofs);
+  const std::vector<ViewRecord> views = {{"0", {-30, 0}}, {"1", {30, 240}}, {"2", {-30, 120}}, {"3", {5, 5}}};
+  EXPECT_THAT(missing_poses(plan, workspace, views),
+              ElementsAre(ElementsAre(-30, 240), ElementsAre(30, 0), ElementsAre(30, 120)));
+}
+
+TEST(MissingPoses, FindAViewAcrossTheSeamOfATurnAndWithinRounding) {
+  const std::vector<Dof> dofs = {table};
+  const Plan plan = make_plan({"p", {{"table", {0, 90, 180}, {}}}}, dofs);
+  const Workspace workspace = plan_workspace(plan, dofs);
+  const std::vector<ViewRecord> views = {{"0", {359.9999999}}, {"1", {90.0000001}}, {"2", {179.99}}};
+  EXPECT_THAT(missing_poses(plan, workspace, views), ElementsAre(ElementsAre(180)));
+}
+
+TEST(MissingPoses, OfTheLargestPlanAreFoundWithoutComparingAllWithAll) {
+  const std::vector<Dof> dofs = {arm, table};
+  const Plan plan =
+      make_plan({"p", {{"arm", {}, Spacing{-90, 90, 100}}, {"table", {}, Spacing{0, 360, 1000}}}}, dofs);
+  const Workspace workspace = plan_workspace(plan, dofs);
+  std::vector<ViewRecord> views;
+  for (std::size_t i = 0; i + 1 < plan.size(); ++i) views.push_back({"f", plan.at(i)});
+  // All with all would be 5e9 comparisons.
+  EXPECT_THAT(missing_poses(plan, workspace, views), ElementsAre(plan.at(plan.size() - 1)));
 }
 
 TEST_F(AcquisitionTest, CoversTheGridOfTwoAxesAndMovesOnlyWhatChanges) {
@@ -83,18 +231,18 @@ TEST_F(AcquisitionTest, CoversTheGridOfTwoAxesAndMovesOnlyWhatChanges) {
   const ImageSet set = ImageSet::open(folder_.path() / "mug");
   ASSERT_EQ(set.views().size(), 6U);
   EXPECT_THAT(set.views()[4].q, ElementsAre(30, 120));
-  EXPECT_THAT(arm_record_.moves, ElementsAre(-30, 30, -30));
+  EXPECT_THAT(arm_record_.moves, ElementsAre(-30, 30, 0));
   EXPECT_THAT(table_record_.moves, ElementsAre(0, 120, 240, 0, 120, 240, 0));
 }
 
 TEST_F(AcquisitionTest, HomesAnAxisThatHasLostItsZero) {
-  table_record_.homed = false;
+  set(table_record_, &FakeAxisRecord::homed, false);
   run(turn("mug"));
   EXPECT_EQ(table_record_.homings, 1);
 }
 
 TEST_F(AcquisitionTest, ALostAxisEndsInItsErrorWithMotionStoppedAndViewsKept) {
-  table_record_.lost_from_move = 3;
+  set(table_record_, &FakeAxisRecord::lost_from_move, 3);
   try {
     run(turn("mug"));
     FAIL() << "succeeded";
@@ -103,27 +251,27 @@ TEST_F(AcquisitionTest, ALostAxisEndsInItsErrorWithMotionStoppedAndViewsKept) {
   }
   EXPECT_EQ(report_.taken, 3U);
   EXPECT_GE(table_record_.stops, 1);
-  EXPECT_GE(arm_record_.stops, 0);
+  EXPECT_GE(arm_record_.stops, 1) << "every axis is stopped, not only the one that failed";
   const ImageSet set = ImageSet::open(folder_.path() / "mug");
   EXPECT_EQ(set.views().size(), 3U);
   EXPECT_FALSE(set.complete());
 }
 
 TEST_F(AcquisitionTest, ContinuesWhereItWasBrokenOff) {
-  table_record_.lost_from_move = 3;
+  set(table_record_, &FakeAxisRecord::lost_from_move, 3);
   EXPECT_THROW(run(turn("mug")), DeviceLost);
-  table_record_.lost_from_move = -1;
-  table_record_.moves.clear();
+  set(table_record_, &FakeAxisRecord::lost_from_move, -1);
+  set(table_record_, &FakeAxisRecord::moves, std::vector<double>());
   const AcquisitionReport report = run(turn("mug"));
   EXPECT_EQ(report.kept, 3U);
   EXPECT_EQ(report.taken, 3U);
-  EXPECT_THAT(table_record_.moves, ElementsAre(180, 240, 300, 0));
+  EXPECT_THAT(table_record_.moves, ElementsAre(180, 240, 300, 120)) << "it stood at 120 when the run began";
   EXPECT_EQ(ImageSet::open(folder_.path() / "mug").views().size(), 6U);
 }
 
 TEST_F(AcquisitionTest, ACompleteSetIsRefusedBeforeAnythingMoves) {
   run(turn("mug"));
-  table_record_.moves.clear();
+  set(table_record_, &FakeAxisRecord::moves, std::vector<double>());
   EXPECT_THROW(run(turn("mug")), FileError);
   EXPECT_TRUE(table_record_.moves.empty());
 }
@@ -134,7 +282,7 @@ TEST_F(AcquisitionTest, ABadObjectNameIsRefusedBeforeAnythingMoves) {
 }
 
 TEST_F(AcquisitionTest, AStopReachesTheAxisInTheMiddleOfAMove) {
-  table_record_.blocks = true;
+  set(table_record_, &FakeAxisRecord::blocks, true);
   std::stop_source source;
   auto acquisition = std::async(std::launch::async, [&] { run(turn("mug"), source.get_token()); });
   {
@@ -148,10 +296,10 @@ TEST_F(AcquisitionTest, AStopReachesTheAxisInTheMiddleOfAMove) {
 }
 
 TEST_F(AcquisitionTest, WithoutACameraNothingIsTakenAndTheErrorSaysWhatToDo) {
-  FrameHub none(FrameHub::OpenCamera{}, clock_);
+  FrameHub none(FrameHub::OpenCamera{}, clock_, heartbeat_);
   AcquisitionReport report;
   try {
-    acquire(turn("mug"), rig_, none, clock_, report, {}, {});
+    acquire(turn("mug"), {rig_, none, clock_}, report, {}, {});
     FAIL() << "succeeded";
   } catch (const DeviceError& error) {
     EXPECT_THAT(error.what(), HasSubstr("add [camera]"));
@@ -159,37 +307,5 @@ TEST_F(AcquisitionTest, WithoutACameraNothingIsTakenAndTheErrorSaysWhatToDo) {
   EXPECT_EQ(report.taken, 0U);
 }
 
-TEST(RigTest, AnAxisThatCannotBeOpenedIsToldAndDoesNotStopTheOthers) {
-  SteadyClock clock;
-  FakeAxisRecord record;
-  RigAxisOptions broken;
-  broken.dof = arm;
-  Rig rig({{broken, []() -> std::unique_ptr<Axis> { throw DeviceLost("arm", "open", "not there"); }},
-           fake(table, record, clock)},
-          {}, clock);
-  EXPECT_THROW(rig.run([](Rig::Control& axes) { axes.move_to("arm", 0, {}); }), DeviceLost);
-  EXPECT_NO_THROW(rig.run([](Rig::Control& axes) { axes.move_to("table", 30, {}); }));
-  const std::vector<AxisStatus> status = rig.status();
-  EXPECT_THAT(status[0].error.value_or(""), HasSubstr("arm: open: not there"));
-  EXPECT_EQ(status[1].state->position, 30.0);
-}
-
-TEST(RigTest, EndingItEndsAMotionUnderWay) {
-  SteadyClock clock;
-  FakeAxisRecord record;
-  record.blocks = true;
-  auto rig = std::make_unique<Rig>(std::vector{fake(table, record, clock)}, std::vector<RigLamp>{}, clock);
-  auto work = std::async(std::launch::async, [&rig = *rig] {
-    rig.run([](Rig::Control& axes) { axes.move_to("table", 90, {}); });
-  });
-  {
-    std::unique_lock lock(record.mutex);
-    record.changed.wait(lock, [&] { return record.moving; });
-  }
-  rig.reset();
-  EXPECT_THROW(work.get(), Interrupted);
-  EXPECT_FALSE(record.moving);
-}
-
 }  // namespace
-}  // namespace eigenpose
+}  // namespace eigenpose::acquisition_test

@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 
-namespace eigenpose {
+namespace eigenpose::plan_test {
 namespace {
 
 using testing::ElementsAre;
@@ -97,4 +97,4 @@ TEST(Plan, RefusesMoreViewsThanAllowedBeforeItComputesThem) {
 }
 
 }  // namespace
-}  // namespace eigenpose
+}  // namespace eigenpose::plan_test

@@ -11,34 +11,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
+#include "tests/daemon/event_keeper.h"
 
-namespace eigenpose {
+namespace eigenpose::jobs_test {
 namespace {
 
-using testing::HasSubstr;
-
-/// Keeps the job events it is given.
-class JobEvents final : public EventSink {
- public:
-  void publish(const Event& event) noexcept override {
-    const auto* changed = std::get_if<JobChanged>(&event);
-    const std::lock_guard lock(mutex_);
-    if (changed != nullptr) seen_.push_back(changed->job);
-    changed_.notify_all();
-  }
-  /// Waits until so many have come.
-  std::vector<JobStatus> first(std::size_t count) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return seen_.size() >= count; });
-    return seen_;
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<JobStatus> seen_;
-};
+using ::testing::HasSubstr;
 
 /// Blocks until the job is asked to stop.
 void wait_for_stop(const std::stop_token& stop) {
@@ -57,15 +37,17 @@ JobStatus ended(const Jobs& jobs, const std::string& id) {
   }
 }
 
-class JobsTest : public testing::Test {
+class JobsTest : public ::testing::Test {
  protected:
-  JobEvents events_;
-  Jobs jobs_{events_};
+  EventKeeper events_;
+  ManualClock clock_;
+  Heartbeat heartbeat_{clock_};
+  Jobs jobs_{events_, heartbeat_};
 };
 
 TEST_F(JobsTest, RunsWorkAndKeepsItsResult) {
   const JobStatus first = jobs_.start(JobKind::learn, "", [](const Jobs::Context&) {
-    return AcquisitionResult{"/sets/mug", 36, 4};
+    return AcquisitionResult{"/sets/mug", 36, 4, 0, {}};
   });
   EXPECT_EQ(first.state, JobState::running);
   const JobStatus job = ended(jobs_, first.id);
@@ -143,7 +125,7 @@ TEST_F(JobsTest, AFailureSaysWhatHappenedAndWhatToDo) {
 TEST_F(JobsTest, EndsWhatRunsWhenItEndsItself) {
   std::atomic<bool> stopped{false};
   {
-    Jobs jobs(events_);
+    Jobs jobs(events_, heartbeat_);
     jobs.start(JobKind::acquire, "mug", [&](const Jobs::Context& job) {
       wait_for_stop(job.stop);
       stopped = true;
@@ -155,11 +137,11 @@ TEST_F(JobsTest, EndsWhatRunsWhenItEndsItself) {
 
 TEST_F(JobsTest, PublishesTheStartAndTheEndOfEachJobInThisOrder) {
   const auto id = jobs_.start(JobKind::learn, "", [](const Jobs::Context&) { return JobResult(); }).id;
-  const std::vector<JobStatus> seen = events_.first(2);
-  EXPECT_EQ(seen[0].id, id);
-  EXPECT_EQ(seen[0].state, JobState::running);
-  EXPECT_EQ(seen[1].state, JobState::done);
-  EXPECT_TRUE(seen[1].ended);
+  const std::vector<JobChanged> seen = events_.first<JobChanged>(2);
+  EXPECT_EQ(seen[0].job.id, id);
+  EXPECT_EQ(seen[0].job.state, JobState::running);
+  EXPECT_EQ(seen[1].job.state, JobState::done);
+  EXPECT_TRUE(seen[1].job.ended);
 }
 
 TEST_F(JobsTest, AnErrorOfADeviceThatWasStoppedOnRequestEndsAsCancelled) {
@@ -187,7 +169,7 @@ TEST_F(JobsTest, ADefectOfTheProgramIsNotBlamedOnTheCaller) {
 
 TEST_F(JobsTest, AJobWhoseThreadCannotStartIsFailedAndBlocksNoOther) {
   bool full = true;
-  Jobs jobs(events_, [&](std::function<void(const std::stop_token&)> body) {
+  Jobs jobs(events_, heartbeat_, [&](std::function<void(const std::stop_token&)> body) {
     if (full) throw std::system_error(EAGAIN, std::generic_category());
     return std::jthread(std::move(body));
   });
@@ -198,9 +180,32 @@ TEST_F(JobsTest, AJobWhoseThreadCannotStartIsFailedAndBlocksNoOther) {
   EXPECT_TRUE(job.ended);
   EXPECT_EQ(jobs.find(job.id)->state, JobState::failed);
   EXPECT_FALSE(jobs.running(JobKind::learn));
-  EXPECT_EQ(events_.first(1)[0].state, JobState::failed);
+  EXPECT_EQ(events_.first<JobChanged>(1)[0].job.state, JobState::failed);
   full = false;
   EXPECT_EQ(ended(jobs, jobs.start(JobKind::learn, "", work).id).state, JobState::done);
+}
+
+TEST_F(JobsTest, LearningWithoutProgressIsOverdueAndAnAcquisitionIsLeftToTheRig) {
+  std::promise<void> begun, reported;
+  std::promise<void> report;
+  jobs_.start(JobKind::learn, "", [&](const Jobs::Context& job) {
+    begun.set_value();
+    report.get_future().wait();
+    job.progress({"normalising", 1, 2});
+    reported.set_value();
+    wait_for_stop(job.stop);
+    return JobResult();
+  });
+  jobs_.start(JobKind::acquire, "mug", [](const Jobs::Context& job) {
+    wait_for_stop(job.stop);
+    return JobResult();
+  });
+  begun.get_future().wait();
+  clock_.advance(job_step_limit + std::chrono::seconds(1));
+  EXPECT_THAT(heartbeat_.overdue(), ::testing::ElementsAre("job 1"));
+  report.set_value();
+  reported.get_future().wait();
+  EXPECT_TRUE(heartbeat_.overdue().empty());
 }
 
 TEST_F(JobsTest, RemembersTheLastHundred) {
@@ -213,4 +218,4 @@ TEST_F(JobsTest, RemembersTheLastHundred) {
 }
 
 }  // namespace
-}  // namespace eigenpose
+}  // namespace eigenpose::jobs_test
