@@ -193,7 +193,10 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   model.provenance = {options.program_version, created,
                       options.image_sets,      told.solver.solver,
                       told.solver.energy,      told.solver.energy_bound};
-  if (kept) kept->commit();
+  if (kept) {
+    told.kept_views = kept->finish();
+    if (report == nullptr) told.kept_views->commit();
+  }
   told.total_time = std::chrono::steady_clock::now() - began;
   return model;
 }

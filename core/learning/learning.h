@@ -7,6 +7,7 @@
 #include <stop_token>
 #include <string>
 
+#include "core/base/atomic_file.h"
 #include "core/base/progress.h"
 #include "core/learning/calibration/distance_calibration.h"
 #include "core/learning/calibration/match_calibration.h"
@@ -38,7 +39,7 @@ struct LearningOptions {
   std::size_t memory_limit = 0;
   std::filesystem::path scratch_folder = {};  ///< where that disk is; empty: the folder for temporary files
   /// A file to keep the views and their inner products in, so that objects can join and leave the model later
-  /// (kept_views.h); empty: nowhere. It is there when `learn` returns.
+  /// (training_archive.h); empty: nowhere. See LearningReport::kept_views.
   std::filesystem::path kept_views = {};
   /// Kept in the model's provenance.
   std::string image_sets;
@@ -58,6 +59,10 @@ struct LearningReport {
   Duration object_eigenspace_time{};
   Duration parts_time{};  ///< windows, pose spaces and their calibration
   Duration total_time{};
+  /// The kept views, written and verified. Commit them when the model is saved: then neither a full disk nor
+  /// a crash leaves a model with the views of another. Learning without a report commits them itself. Null
+  /// where none are kept.
+  std::shared_ptr<AtomicFile> kept_views;
 };
 
 /// Learns a model of all objects of `sets`. `options.normalization.cropped` is decided here: true when every

@@ -79,7 +79,7 @@ std::vector<Lane> make_lanes(const PartsViews& views, bool companions, PartsObje
         }
         lanes.push_back(
             {static_cast<std::size_t>(v), factor == 1.0 ? picture : foreshortened(picture, factor)});
-        object.lane_candidate.push_back(static_cast<std::uint16_t>(object.candidates.size() - 1));
+        object.lane_candidate.push_back(static_cast<std::uint32_t>(object.candidates.size() - 1));
       }
     }
   }

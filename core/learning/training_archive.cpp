@@ -1,6 +1,7 @@
 #include "core/learning/training_archive.h"
 
 #include <algorithm>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "core/dataset/natural_order.h"
 #include "core/model/hdf5_file.h"
 #include "core/model/hdf5_links.h"
+#include "core/model/hdf5_output.h"
 #include "core/model/sealed_file.h"
 
 namespace eigenpose {
@@ -32,9 +34,9 @@ void write_options(const Hdf5Group& group, const LearningOptions& options) {
 LearningOptions read_options(const Hdf5Group& group) {
   LearningOptions options;
   options.solver.solver = group.read_text("solver");
-  options.solver.components = static_cast<std::size_t>(group.read_integer("components"));
+  options.solver.components = static_cast<std::size_t>(group.read_integer("components", 0, 1 << 20));
   if (const double energy = group.read_double("energy"); energy > 0.0) options.solver.energy = energy;
-  options.spline_degree = static_cast<int>(group.read_integer("spline_degree"));
+  options.spline_degree = static_cast<int>(group.read_integer("spline_degree", 1, 3));
   options.object_spaces = group.read_bool("object_spaces");
   options.parts = group.read_bool("parts");
   options.image_sets = group.read_text("image_sets");
@@ -64,6 +66,7 @@ void write_object(const Hdf5Group& group, const TrainingViews& views, const Obje
 ObjectViews read_object(const Hdf5Group& group, std::size_t first) {
   ObjectViews object;
   object.object = group.read_text("name");
+  check_object_name(object.object);
   object.cropped = group.read_bool("cropped");
   object.first = first;
   object.count = 1;
@@ -78,6 +81,8 @@ ObjectViews read_object(const Hdf5Group& group, std::size_t first) {
   const Eigen::MatrixXd extents = group.read_doubles("extents");
   if (extents.rows() != 2 || static_cast<std::size_t>(extents.cols()) != object.count)
     throw Hdf5Failure("has objects whose parts do not fit together");
+  if (!(extents.minCoeff() >= 0.0) || !(extents.maxCoeff() <= 1e5))
+    throw Hdf5Failure("has views of sizes that cannot be");
   for (Eigen::Index i = 0; i < extents.cols(); ++i)
     object.extents.emplace_back(static_cast<int>(extents(0, i)), static_cast<int>(extents(1, i)));
   return object;
@@ -94,8 +99,10 @@ auto with_hdf5(const std::filesystem::path& file, const Work& work) {
     return work();
   } catch (const Hdf5Failure& failure) {
     throw refuse(failure.what());
-  } catch (const std::invalid_argument& failure) {
+  } catch (const std::logic_error& failure) {
     throw refuse(failure.what());
+  } catch (const std::bad_alloc&) {
+    throw refuse("needs more memory than there is");
   }
 }
 
@@ -109,7 +116,8 @@ ConfigError not_there(const TrainingArchive& kept, const std::string& name) {
 }
 
 std::filesystem::path checked(std::filesystem::path file) {
-  if (!std::filesystem::exists(file))
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error)
     throw FileError(file, "there are no kept views; " + std::string(views_format.remedy));
   check_seal(views_format, file);
   return file;
@@ -158,6 +166,8 @@ void TrainingArchive::read(std::size_t o, std::span<std::uint8_t> pictures, std:
     const Eigen::MatrixXf read = object.read_floats("energies");
     if (read.rows() != 1 || static_cast<std::size_t>(read.cols()) != energies.size())
       throw Hdf5Failure("has objects whose parts do not fit together");
+    if (!(read.minCoeff() >= 0.0F) || !read.allFinite())
+      throw Hdf5Failure("has views of energies that cannot be");
     std::copy_n(read.data(), energies.size(), energies.data());
   });
 }
@@ -166,6 +176,7 @@ Eigen::MatrixXd TrainingArchive::products() const {
   return with_hdf5(file_, [&] {
     if (!open_->root.has("products")) return Eigen::MatrixXd();
     Eigen::MatrixXd products = open_->root.read_doubles("products");
+    if (!products.allFinite()) throw Hdf5Failure("has products that are not finite");
     const auto count = objects_.empty() ? 0 : objects_.back().first + objects_.back().count;
     if (products.rows() != products.cols() || static_cast<std::size_t>(products.rows()) != count)
       throw Hdf5Failure("has products that do not fit its views");
@@ -175,29 +186,28 @@ Eigen::MatrixXd TrainingArchive::products() const {
 
 TrainingArchiveWriter::TrainingArchiveWriter(const std::filesystem::path& file, const TrainingViews& views,
                                              const LearningOptions& options, std::string created)
-    : target_(file), file_(file), views_(views), options_(options), created_(std::move(created)) {}
+    : file_(std::make_unique<AtomicFile>(file)),
+      views_(views),
+      options_(options),
+      created_(std::move(created)) {}
 
 void TrainingArchiveWriter::write(const Eigen::MatrixXd& products) {
-  try {
-    const Hdf5Lock lock;
-    const Hdf5Handle file = create_hdf5(file_.part(), seal_size);
-    const Hdf5Group root = root_of(file);
+  write_hdf5(*file_, seal_size, [&](const Hdf5Group& root) {
     root.write("created", created_);
     write_options(root.make_group("options"), options_);
     const Hdf5Group objects = root.make_group("objects");
     for (std::size_t o = 0; o < views_.objects().size(); ++o)
       write_object(objects.make_group(numbered(o)), views_, views_.objects()[o]);
     if (products.size() > 0) root.write("products", products);
-  } catch (const Hdf5Failure& failure) {
-    throw FileError(target_, failure.what());
-  }
-  seal_file(views_format, file_.part());
+  });
+  seal_file(views_format, *file_);
   written_ = true;
 }
 
-void TrainingArchiveWriter::commit() {
+std::unique_ptr<AtomicFile> TrainingArchiveWriter::finish() {
   if (!written_) write({});
-  file_.commit();
+  file_->prepare([](const std::filesystem::path& part) { const TrainingArchive readable(part); });
+  return std::move(file_);
 }
 
 std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<const std::string> leaving,

@@ -62,7 +62,7 @@ class TrainingArchive {
   std::vector<ObjectViews> objects_;
 };
 
-/// Keeps views while they are learned: the file appears, or replaces the former one, at `commit`.
+/// Writes the views that are learned.
 class TrainingArchiveWriter {
  public:
   /// @param views outlives the writer.
@@ -70,12 +70,12 @@ class TrainingArchiveWriter {
                         const LearningOptions& options, std::string created);
   /// At most once. @param products 0 × 0 where there are none. @throws FileError.
   void write(const Eigen::MatrixXd& products);
-  /// @throws FileError.
-  void commit();
+  /// Writes what is not written yet and verifies it. @return the file, which appears, or replaces the former
+  /// one, when it is committed. At most once. @throws FileError.
+  [[nodiscard]] std::unique_ptr<AtomicFile> finish();
 
  private:
-  std::filesystem::path target_;
-  AtomicFile file_;
+  std::unique_ptr<AtomicFile> file_;
   const TrainingViews& views_;
   LearningOptions options_;
   std::string created_;

@@ -12,6 +12,12 @@ std::mutex& library_mutex() {
   return mutex;
 }
 
+/// A handle could not be closed. Guarded by the library's mutex.
+bool& close_failure() {
+  static bool failed = false;
+  return failed;
+}
+
 void check(herr_t status, const std::string& what) {
   if (status < 0) throw Hdf5Failure(what);
 }
@@ -44,10 +50,27 @@ Hdf5Handle make_dataset(hid_t group, const std::string& name, hid_t file_type, h
 
 void write_list(hid_t group, const std::string& name, hid_t file_type, hid_t memory_type, hsize_t size,
                 const void* values) {
-  const std::string what = "cannot write \"" + name + "\"; is the disk full?";
+  const std::string what = "cannot write \"" + name + "\"";
   const Hdf5Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose, what);
   const Hdf5Handle data = make_dataset(group, name, file_type, space.get(), what);
   check(H5Dwrite(data.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), what);
+}
+
+constexpr std::size_t longest_text = std::size_t{1} << 20;
+
+/// What a dataset claims is in this file, so that nothing is allocated for values that are not there.
+void check_storage(hid_t dataset, hid_t space, const std::string& what) {
+  const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose, what);
+  const Hdf5Handle type(H5Dget_type(dataset), H5Tclose, what);
+  const Hdf5Handle file(H5Iget_file_id(dataset), H5Fclose, what);
+  hsize_t file_size = 0;
+  check(H5Fget_filesize(file.get(), &file_size), what);
+  const H5D_layout_t layout = H5Pget_layout(creation.get());
+  const hssize_t values = H5Sget_simple_extent_npoints(space);
+  const std::size_t value_size = H5Tget_size(type.get());
+  if ((layout != H5D_CONTIGUOUS && layout != H5D_COMPACT) || H5Pget_external_count(creation.get()) != 0 ||
+      values < 0 || value_size == 0 || static_cast<hsize_t>(values) > file_size / value_size)
+    throw Hdf5Failure(what);
 }
 
 /// A dataset of one dimension, and its length.
@@ -56,7 +79,8 @@ struct OpenList {
       : data(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose, what) {
     const Hdf5Handle space(H5Dget_space(data.get()), H5Sclose, what);
     if (H5Sget_simple_extent_ndims(space.get()) != 1) throw Hdf5Failure(what);
-    H5Sget_simple_extent_dims(space.get(), &size, nullptr);
+    check(H5Sget_simple_extent_dims(space.get(), &size, nullptr), what);
+    check_storage(data.get(), space.get(), what);
   }
   Hdf5Handle data;
   hsize_t size = 0;
@@ -81,8 +105,7 @@ Matrix read_dataset(hid_t group, const std::string& name, hid_t memory_type) {
   std::array<hsize_t, 2> shape{};
   if (H5Sget_simple_extent_ndims(space.get()) != 2) throw Hdf5Failure(what);
   check(H5Sget_simple_extent_dims(space.get(), shape.data(), nullptr), what);
-  constexpr hsize_t most = 1U << 28;  // numbers; far above any model, far below an overflow
-  if (shape[0] > most || shape[1] > most || shape[0] * shape[1] > most) throw Hdf5Failure(what);
+  check_storage(dataset.get(), space.get(), what);
   Matrix matrix(static_cast<Eigen::Index>(shape[1]), static_cast<Eigen::Index>(shape[0]));
   check(H5Dread(dataset.get(), memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, matrix.data()), what);
   return matrix;
@@ -108,7 +131,11 @@ Hdf5Handle::Hdf5Handle(Hdf5Handle&& other) noexcept
     : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
 
 Hdf5Handle::~Hdf5Handle() {
-  if (id_ >= 0) close_(id_);
+  if (id_ >= 0 && close_(id_) < 0) close_failure() = true;
+}
+
+bool take_close_failure() {
+  return std::exchange(close_failure(), false);
 }
 
 Hdf5Group Hdf5Group::make_group(const std::string& name) const {
@@ -157,9 +184,13 @@ double Hdf5Group::read_double(const std::string& attribute) const {
   return value;
 }
 
-std::int64_t Hdf5Group::read_integer(const std::string& attribute) const {
+std::int64_t Hdf5Group::read_integer(const std::string& attribute, std::int64_t lower,
+                                     std::int64_t upper) const {
   std::int64_t value = 0;
   read_attribute(handle_.get(), attribute, H5T_NATIVE_INT64, &value);
+  if (value < lower || value > upper)
+    throw Hdf5Failure("has \"" + attribute + "\" of " + std::to_string(value) + "; allowed are " +
+                      std::to_string(lower) + " to " + std::to_string(upper));
   return value;
 }
 
@@ -168,7 +199,9 @@ std::string Hdf5Group::read_text(const std::string& attribute) const {
   const Hdf5Handle open(H5Aopen(handle_.get(), attribute.c_str(), H5P_DEFAULT), H5Aclose, what);
   const Hdf5Handle type(H5Aget_type(open.get()), H5Tclose, what);
   if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0) throw Hdf5Failure(what);
-  std::vector<char> text(H5Tget_size(type.get()) + 1, '\0');
+  const std::size_t size = H5Tget_size(type.get());
+  if (size > longest_text) throw Hdf5Failure(what);
+  std::vector<char> text(size + 1, '\0');
   check(H5Aread(open.get(), type.get(), text.data()), what);
   return text.data();
 }
@@ -218,13 +251,6 @@ Eigen::MatrixXf Hdf5Group::read_floats(const std::string& dataset) const {
 
 Eigen::MatrixXd Hdf5Group::read_doubles(const std::string& dataset) const {
   return read_dataset<Eigen::MatrixXd>(handle_.get(), dataset, H5T_NATIVE_DOUBLE);
-}
-
-Hdf5Handle create_hdf5(const std::filesystem::path& path, std::uint64_t user_block) {
-  const Hdf5Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "cannot begin a file");
-  check(H5Pset_userblock(creation.get(), user_block), "cannot set the user block");
-  return {H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation.get(), H5P_DEFAULT), H5Fclose,
-          "cannot be made; is the folder there and writable?"};
 }
 
 Hdf5Handle open_hdf5(const std::filesystem::path& path) {

@@ -54,6 +54,7 @@ class Hdf5Handle {
 class Hdf5Group {
  public:
   explicit Hdf5Group(Hdf5Handle handle) : handle_(std::move(handle)) {}
+  [[nodiscard]] hid_t id() const { return handle_.get(); }
 
   [[nodiscard]] Hdf5Group make_group(const std::string& name) const;
   [[nodiscard]] Hdf5Group open_group(const std::string& name) const;
@@ -64,13 +65,18 @@ class Hdf5Group {
   void write(const std::string& attribute, std::int64_t value) const;
   void write(const std::string& attribute, const std::string& value) const;
   [[nodiscard]] double read_double(const std::string& attribute) const;
-  [[nodiscard]] std::int64_t read_integer(const std::string& attribute) const;
-  [[nodiscard]] bool read_bool(const std::string& attribute) const { return read_integer(attribute) != 0; }
+  /// @throws Hdf5Failure also for a value that is not in [lower, upper].
+  [[nodiscard]] std::int64_t read_integer(const std::string& attribute, std::int64_t lower,
+                                          std::int64_t upper) const;
+  [[nodiscard]] bool read_bool(const std::string& attribute) const {
+    return read_integer(attribute, 0, 1) != 0;
+  }
   [[nodiscard]] std::string read_text(const std::string& attribute) const;
   [[nodiscard]] bool has_attribute(const std::string& name) const;
 
   /// Datasets. A matrix is stored column after column, as rows of a file dataset: its shape there is cols ×
-  /// rows.
+  /// rows. Reading refuses a dataset that claims more bytes than the file has, or whose values stand in other
+  /// files.
   void write(const std::string& dataset, const Eigen::MatrixXf& matrix) const;
   void write(const std::string& dataset, const Eigen::MatrixXd& matrix) const;
   void write(const std::string& dataset, const std::vector<std::int8_t>& bytes) const;
@@ -87,10 +93,11 @@ class Hdf5Group {
   Hdf5Handle handle_;
 };
 
-/// Makes a file whose first `user_block` bytes are left to the caller, and returns its root. The file is
-/// written when `file` is destroyed, after the root.
-Hdf5Handle create_hdf5(const std::filesystem::path& path, std::uint64_t user_block);
-/// Opens a file to read it. Takes no lock on it: our files are replaced, never changed.
+/// True if a handle could not be closed since this was last asked. Under the lock.
+bool take_close_failure();
+
+/// Opens a file to read it. Takes no lock on it: our files are replaced, never changed. To write one:
+/// hdf5_output.h.
 Hdf5Handle open_hdf5(const std::filesystem::path& path);
 Hdf5Group root_of(const Hdf5Handle& file);
 

@@ -15,14 +15,14 @@ void write_normalization(const Hdf5Group& group, const NormalizationOptions& opt
 
 NormalizationOptions read_normalization(const Hdf5Group& group) {
   NormalizationOptions options;
-  options.size = static_cast<int>(group.read_integer("size"));
+  options.size = static_cast<int>(group.read_integer("size", 8, 256));
   set_image_type(options, group.read_text("type"));
   if (options.color != group.read_bool("color"))
     throw Hdf5Failure("has an image type that does not fit its colour");
   options.cropped = group.read_bool("cropped");
-  options.segmentation.least_contrast = static_cast<int>(group.read_integer("least_contrast"));
+  options.segmentation.least_contrast = static_cast<int>(group.read_integer("least_contrast", 1, 200));
   options.segmentation.noise_sigmas = group.read_double("noise_sigmas");
-  options.segmentation.bridged_gap = static_cast<int>(group.read_integer("bridged_gap"));
+  options.segmentation.bridged_gap = static_cast<int>(group.read_integer("bridged_gap", 0, 16));
   options.segmentation.dirt_share = group.read_double("dirt_share");
   return options;
 }

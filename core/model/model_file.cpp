@@ -1,6 +1,8 @@
 #include "core/model/model_file.h"
 
-#include <algorithm>
+#include <cstdint>
+#include <new>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -8,6 +10,8 @@
 #include "core/base/error.h"
 #include "core/model/hdf5_file.h"
 #include "core/model/hdf5_links.h"
+#include "core/model/hdf5_output.h"
+#include "core/model/model_check.h"
 #include "core/model/parts_file.h"
 #include "core/model/sealed_file.h"
 
@@ -67,7 +71,7 @@ ModelObject read_object(const Hdf5Group& group) {
     dofs.push_back(sample_axes.back().dof);
     observable.push_back(axis.read_bool("observable"));
   }
-  const int degree = static_cast<int>(group.read_integer("degree"));
+  const int degree = static_cast<int>(group.read_integer("degree", 1, 3));
   std::optional<ObjectEigenspace> space;
   if (group.has("space")) {
     const Hdf5Group own = group.open_group("space");
@@ -84,14 +88,11 @@ ModelObject read_object(const Hdf5Group& group) {
   object.dof_observable = std::move(observable);
   object.pose_observable = group.read_bool("pose_observable");
   object.space = std::move(space);
-  object.views = static_cast<std::size_t>(group.read_integer("views"));
+  object.views = static_cast<std::size_t>(group.read_integer("views", 0, std::int64_t{1} << 31));
   return object;
 }
 
-void write_content(const Model& model, const std::filesystem::path& part) {
-  const Hdf5Lock lock;
-  const Hdf5Handle file = create_hdf5(part, seal_size);
-  const Hdf5Group root = root_of(file);
+void write_content(const Hdf5Group& root, const Model& model) {
   write_normalization(root.make_group("normalization"), model.normalization);
   write_eigenspace(root.make_group("eigenspace"), model.eigenspace);
   const Hdf5Group objects = root.make_group("objects");
@@ -130,51 +131,34 @@ Model read_content(const std::filesystem::path& path) {
   return model;
 }
 
-bool fits(const Eigenspace& space, const Manifold& manifold, std::size_t length) {
-  const auto n = static_cast<Eigen::Index>(length);
-  return space.mean.size() == n && space.basis.rows() == n && space.components() >= 1 &&
-         space.eigenvalues.size() == space.components() && manifold.dimensions() == space.components();
-}
-
-/// The parts fit together. @throws Hdf5Failure.
-void check_shapes(const Model& model) {
-  const NormalizationOptions& options = model.normalization;
-  const int side = reduced_side(options);
-  const auto reduced =
-      static_cast<std::size_t>(side) * static_cast<std::size_t>(side * appearance_bands(options));
-  bool good = !model.objects.empty();
-  for (const ModelObject& object : model.objects) {
-    good = good && fits(model.eigenspace, object.manifold, appearance_length(options));
-    if (object.space) good = good && fits(object.space->eigenspace, object.space->manifold, reduced);
-  }
-  if (!good) throw Hdf5Failure("has parts that do not fit together");
-}
-
 }  // namespace
 
 void save_model(const Model& model, const std::filesystem::path& file) {
   AtomicFile atomic(file);
-  try {
-    write_content(model, atomic.part());
-  } catch (const Hdf5Failure& failure) {
-    throw FileError(file, failure.what());
-  }
-  seal_file(model_format, atomic.part());
-  atomic.commit();
+  remove_abandoned_parts(atomic.part().parent_path());
+  write_hdf5(atomic, seal_size, [&](const Hdf5Group& root) { write_content(root, model); });
+  seal_file(model_format, atomic);
+  atomic.commit([](const std::filesystem::path& part) { (void)load_model(part); });
 }
 
 Model load_model(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file))
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error)
     throw FileError(file, "there is no such model; 'eigenpose learn' makes one");
   check_seal(model_format, file);
+  const auto refuse = [&](const char* what) {
+    return FileError(file, std::string(what) + "; " + std::string(model_format.remedy));
+  };
   try {
     Model model = read_content(file);
-    check_shapes(model);
+    check_model(model);
     return model;
   } catch (const Hdf5Failure& failure) {
-    throw FileError(file, std::string(failure.what()) + "; learn the model again from its image sets");
-  } catch (const std::invalid_argument& failure) {
-    throw FileError(file, std::string(failure.what()) + "; learn the model again from its image sets");
+    throw refuse(failure.what());
+  } catch (const std::logic_error& failure) {  // values that fit no container or no workspace
+    throw refuse(failure.what());
+  } catch (const std::bad_alloc&) {
+    throw refuse("needs more memory than there is");
   }
 }
 

@@ -1,5 +1,8 @@
 #include "core/model/parts_file.h"
 
+#include <algorithm>
+#include <cstdint>
+
 namespace eigenpose {
 namespace {
 
@@ -13,7 +16,7 @@ void write_scale(const Hdf5Group& group, const PoseScale& scale, const Manifold&
 
 PoseScale read_scale(const Hdf5Group& group) {
   PoseScale scale;
-  scale.side = static_cast<int>(group.read_integer("side"));
+  scale.side = static_cast<int>(group.read_integer("side", 1, PosePicture::side));
   scale.basis = group.read_floats("basis");
   scale.mean = group.read_floats("mean");
   return scale;
@@ -22,7 +25,33 @@ PoseScale read_scale(const Hdf5Group& group) {
 Manifold read_manifold(const Hdf5Group& group, const Manifold& like) {
   const auto axes = like.axes();
   return Manifold::from_coefficients({axes.begin(), axes.end()}, group.read_doubles("coefficients"),
-                                     static_cast<int>(group.read_integer("degree")));
+                                     static_cast<int>(group.read_integer("degree", 1, 3)));
+}
+
+/// An index as files keep them. @throws Hdf5Failure for one out of range, or none at all.
+int whole_number(double value, int lower, int upper) {
+  if (!(value >= lower && value <= upper)) throw Hdf5Failure("has windows that do not fit together");
+  return static_cast<int>(value);
+}
+
+void write_voting(const Hdf5Group& group, const VotingOptions& voting) {
+  group.write("tolerance_cells", std::int64_t{voting.tolerance.cells});
+  group.write("tolerance_penalty", static_cast<double>(voting.tolerance.penalty));
+  group.write("width", static_cast<double>(voting.width));
+  group.write("pooling", static_cast<double>(voting.pooling));
+  group.write("background_rank", std::int64_t{voting.background_rank});
+  group.write("floor_weight", static_cast<double>(voting.floor_weight));
+}
+
+VotingOptions read_voting(const Hdf5Group& group) {
+  VotingOptions voting;
+  voting.tolerance.cells = static_cast<int>(group.read_integer("tolerance_cells", 0, WindowGrid::side));
+  voting.tolerance.penalty = static_cast<float>(group.read_double("tolerance_penalty"));
+  voting.width = static_cast<float>(group.read_double("width"));
+  voting.pooling = static_cast<float>(group.read_double("pooling"));
+  voting.background_rank = static_cast<int>(group.read_integer("background_rank", 1, 1'000'000));
+  voting.floor_weight = static_cast<float>(group.read_double("floor_weight"));
+  return voting;
 }
 
 void write_windows(const Hdf5Group& group, const PartsObject& object) {
@@ -50,25 +79,18 @@ PartsObject read_windows(const Hdf5Group& group, const WindowScale& scale) {
   }
   const auto count = static_cast<int>(candidates.cols());
   for (int c = 0; c < count; ++c) {
-    object.candidates.push_back({static_cast<int>(candidates(0, c)), candidates(1, c) != 0.0});
-    object.neighbours.push_back({static_cast<int>(candidates(2, c)), static_cast<int>(candidates(3, c))});
-    for (const int neighbour : object.neighbours.back()) {
-      if (neighbour < -1 || neighbour >= count) {
-        throw Hdf5Failure("has windows that do not fit together");
-      }
-    }
+    object.candidates.push_back({whole_number(candidates(0, c), 0, count - 1), candidates(1, c) != 0.0});
+    object.neighbours.push_back(
+        {whole_number(candidates(2, c), -1, count - 1), whole_number(candidates(3, c), -1, count - 1)});
   }
-  for (Eigen::Index i = 0; i < lanes.cols(); ++i) {
-    if (lanes(0, i) < 0.0 || lanes(0, i) >= count) {
-      throw Hdf5Failure("has windows that do not fit together");
-    }
-    object.lane_candidate.push_back(static_cast<std::uint16_t>(lanes(0, i)));
-  }
+  for (Eigen::Index i = 0; i < lanes.cols(); ++i)
+    object.lane_candidate.push_back(static_cast<std::uint32_t>(whole_number(lanes(0, i), 0, count - 1)));
   object.store = WindowStore(object.lane_candidate.size(), group.read_bytes("windows"), scale);
   return object;
 }
 
-/// 2 × views; one column of zeros where there are none.
+/// 2 × views: zeros of an object whose views came ready-cut, one column of zeros where those of all objects
+/// did.
 Eigen::MatrixXd extents_matrix(const std::vector<cv::Size>& extents) {
   Eigen::MatrixXd matrix =
       Eigen::MatrixXd::Zero(2, std::max<Eigen::Index>(1, static_cast<Eigen::Index>(extents.size())));
@@ -78,11 +100,12 @@ Eigen::MatrixXd extents_matrix(const std::vector<cv::Size>& extents) {
 }
 
 std::vector<cv::Size> read_extents(const Eigen::MatrixXd& matrix, const PartsObject& object) {
-  if (matrix.rows() == 2 && matrix.cols() == 1 && matrix.isZero()) return {};
+  if (matrix.rows() == 2 && matrix.cols() == 1 && matrix.isZero(0.0)) return {};
   const auto views = std::count_if(object.candidates.begin(), object.candidates.end(),
                                    [](const Candidate& candidate) { return !candidate.mirrored; });
-  if (matrix.rows() != 2 || matrix.cols() != views || !(matrix.minCoeff() >= 1.0) ||
-      !(matrix.maxCoeff() <= 1e5))
+  const bool ready_cut = matrix.isZero(0.0);
+  if (matrix.rows() != 2 || matrix.cols() != views ||
+      !(ready_cut || (matrix.minCoeff() >= 1.0 && matrix.maxCoeff() <= 1e5)))
     throw Hdf5Failure("has views of sizes that cannot be");
   std::vector<cv::Size> extents;
   for (Eigen::Index v = 0; v < matrix.cols(); ++v)
@@ -101,6 +124,7 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
   group.write("mean_mass", static_cast<double>(parts.space.mean_mass()));
   group.write("learned_step", static_cast<double>(parts.scale.learned));
   group.write("query_step", static_cast<double>(parts.scale.query));
+  write_voting(group.make_group("voting"), parts.voting);
   group.write("noise", parts.noise);
   group.write("smallest_rate", parts.smallest_rate);
   group.write("sure_ratio", parts.sure_ratio);
@@ -126,7 +150,7 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
 
 PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& objects) {
   PartsModel parts;
-  parts.bands = static_cast<int>(group.read_integer("bands"));
+  parts.bands = static_cast<int>(group.read_integer("bands", 1, 3));
   const Eigen::MatrixXf background = group.read_floats("background");
   const Hdf5Group stored = group.open_group("objects");
   const std::vector<std::string> names = stored.group_names();
@@ -141,6 +165,8 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
   }
   parts.scale = {static_cast<float>(group.read_double("learned_step")),
                  static_cast<float>(group.read_double("query_step"))};
+  // Files of before these options were kept have what was the default then.
+  if (group.has("voting")) parts.voting = read_voting(group.open_group("voting"));
   parts.noise = group.read_double("noise");
   parts.smallest_rate = group.read_double("smallest_rate");
   parts.sure_ratio = group.read_double("sure_ratio");

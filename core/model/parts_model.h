@@ -42,8 +42,9 @@ struct PartsModel {
   std::vector<PartsObject> objects;
   std::vector<AlignmentEigenspace> poses;     ///< one an object
   std::vector<PartsCalibration> calibration;  ///< one an object
-  /// For each object the size of the region that each learned view was cut out of, pixels; empty where views
-  /// came ready-cut. Tells objects apart that touch, as long as the camera stays where it was.
+  /// For each object the size of the region that each learned view was cut out of, pixels: zero for the views
+  /// of an object that came ready-cut; nothing at all where all objects did. Separates objects that touch, as
+  /// long as the camera stays where it was.
   std::vector<std::vector<cv::Size>> extents;
 
   /// The whole region settles which object it is when its squared distance is below this times that of the

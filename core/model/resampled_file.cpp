@@ -6,7 +6,7 @@
 #include "core/base/atomic_file.h"
 #include "core/base/error.h"
 #include "core/manifold/resample.h"
-#include "core/model/hdf5_file.h"
+#include "core/model/hdf5_output.h"
 
 namespace eigenpose {
 namespace {
@@ -25,15 +25,10 @@ void write_group(const Hdf5Group& group, const ModelObject& object, const Resamp
 void write_hdf5(const Model& model, std::span<const std::size_t> objects, const ResamplingOptions& options,
                 const std::filesystem::path& file) {
   AtomicFile atomic(file);
-  try {
-    const Hdf5Lock lock;
-    const Hdf5Handle handle = create_hdf5(atomic.part(), 0);
-    const Hdf5Group root = root_of(handle);
+  write_hdf5(atomic, 0, [&](const Hdf5Group& root) {
     for (const std::size_t o : objects)
       write_group(root.make_group(model.objects[o].name), model.objects[o], options);
-  } catch (const Hdf5Failure& failure) {
-    throw FileError(file, failure.what());
-  }
+  });
   atomic.commit();
 }
 

@@ -4,13 +4,14 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <zlib.h>
 
 #include "core/base/error.h"
+#include "core/base/input_file.h"
 
 namespace eigenpose {
 namespace {
@@ -22,14 +23,17 @@ struct Content {
   std::uint32_t checksum = 0;
 };
 
-/// What follows the seal in a file that stands there.
-Content read_content(std::istream& file) {
+/// What follows the seal. @param read (position, bytes) → how many bytes were read, fewer only at the end.
+template <typename Read>
+Content measure_content(const Read& read) {
   Content content;
   uLong crc = crc32(0L, nullptr, 0);
-  std::vector<char> piece(std::size_t{1} << 20);
-  while (file.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file.gcount() > 0) {
-    crc = crc32(crc, reinterpret_cast<const Bytef*>(piece.data()), static_cast<uInt>(file.gcount()));
-    content.bytes += static_cast<std::uintmax_t>(file.gcount());
+  std::vector<std::uint8_t> piece(std::size_t{1} << 20);
+  for (;;) {
+    const std::size_t count = read(seal_size + content.bytes, std::span(piece));
+    crc = crc32(crc, piece.data(), static_cast<uInt>(count));
+    content.bytes += count;
+    if (count < piece.size()) break;
   }
   content.checksum = static_cast<std::uint32_t>(crc);
   return content;
@@ -55,33 +59,30 @@ long long number_after(std::string_view key, std::string_view seal) {
 
 }  // namespace
 
-void seal_file(const SealedFormat& format, const std::filesystem::path& file) {
-  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
-  stream.seekg(seal_size);
-  const Seal seal = make_seal(format, read_content(stream));
-  stream.clear();
-  stream.seekp(0);
-  stream.write(seal.data(), seal.size());
-  stream.close();
-  if (!stream) throw FileError(file, "cannot be written; is the disk full?");
+void seal_file(const SealedFormat& format, AtomicFile& file) {
+  const Seal seal = make_seal(format, measure_content([&](std::uint64_t at, std::span<std::uint8_t> bytes) {
+                                return file.read_at(at, bytes);
+                              }));
+  file.write_at(0, {seal.data(), seal.size()});
 }
 
 void check_seal(const SealedFormat& format, const std::filesystem::path& file) {
   const std::string remedy(format.remedy);
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw FileError(file, "cannot be opened; is it there, and may it be read?");
-  Seal found{};
-  stream.read(found.data(), found.size());
-  const std::string_view text(found.data(), static_cast<std::size_t>(stream.gcount()));
+  const InputFile in(file);
+  std::array<std::uint8_t, seal_size> found{};
+  const std::size_t count = in.read_some(0, found);
+  const std::string_view text(reinterpret_cast<const char*>(found.data()), count);
   if (!text.starts_with(format.magic)) throw FileError(file, std::string(format.absent));
   if (const long long version = number_after("\nversion ", text); version != format.version)
     throw FileError(file, "is of version " + std::to_string(version) + ", this program reads version " +
                               std::to_string(format.version) + "; " + remedy);
-  const Content content = read_content(stream);
+  const Content content = measure_content(
+      [&](std::uint64_t at, std::span<std::uint8_t> bytes) { return in.read_some(at, bytes); });
   const long long promised = number_after("\ncontent_bytes ", text);
   if (text.size() < seal_size || promised > static_cast<long long>(content.bytes))
     throw FileError(file, "is truncated; restore it from a copy or " + remedy);
-  if (found != make_seal(format, content))
+  const Seal expected = make_seal(format, content);
+  if (text != std::string_view(expected.data(), expected.size()))
     throw FileError(file, "is damaged (wrong checksum); restore it from a copy or " + remedy);
 }
 

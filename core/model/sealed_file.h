@@ -10,6 +10,8 @@
 #include <filesystem>
 #include <string_view>
 
+#include "core/base/atomic_file.h"
+
 namespace eigenpose {
 
 inline constexpr std::size_t seal_size = 512;  ///< HDF5 wants a power of two, at least 512
@@ -24,7 +26,7 @@ struct SealedFormat {
 
 /// Fills the first 512 bytes of a file whose content is complete. Reads it once, in pieces. @throws
 /// FileError.
-void seal_file(const SealedFormat& format, const std::filesystem::path& file);
+void seal_file(const SealedFormat& format, AtomicFile& file);
 
 /// Reads the file once, in pieces. @throws FileError saying what is wrong (missing, another format or
 /// version, truncated, damaged) and what to do.

@@ -27,7 +27,7 @@ struct Candidate {
 struct PartsObject {
   std::vector<Candidate> candidates;
   /// store's view → candidate; several where a candidate was also learned foreshortened.
-  std::vector<std::uint16_t> lane_candidate;
+  std::vector<std::uint32_t> lane_candidate;
   /// For each candidate up to two neighbours that share its votes, −1 for none.
   std::vector<std::array<int, 2>> neighbours;
   WindowStore store;

@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/image/picture_file.h"
 #include "core/model/model_file.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/learned_world.h"
 
 namespace eigenpose {
@@ -219,11 +220,46 @@ TEST_F(TrainingArchiveTest, RefusesOneFlippedByteAnywhereAndAFileCutOff) {
   }
   auto other = bytes;
   const std::string text(other.begin(), other.begin() + 100);
-  other[text.find("version 1") + 8] = '7';
-  put(other);
-  EXPECT_THAT(refusal("kept"), AllOf(HasSubstr("version 7"), HasSubstr("--keep-views")));
+  for (const char version : {'0', '2', '7'}) {
+    other[text.find("version 1") + 8] = static_cast<unsigned char>(version);
+    put(other);
+    EXPECT_THAT(refusal("kept"),
+                AllOf(HasSubstr(std::string("version ") + version), HasSubstr("--keep-views")));
+  }
   std::filesystem::remove(path("kept"));
   EXPECT_THAT(refusal("kept"), HasSubstr("no kept views"));
+}
+
+TEST_F(TrainingArchiveTest, ReplaceTheFormerOnesWhenTheModelIsSavedAndNotBefore) {
+  write("one", 1);
+  keep("kept");
+  const auto before = read_file(path("kept"));
+  write("two", 2);
+  LearningOptions options = testing::small_learning();
+  options.kept_views = path("kept");
+  const auto images = open_image_sets(sets());
+  LearningReport report;
+  const Model model = learn(all_views(images), options, &report);
+  EXPECT_EQ(read_file(path("kept")), before);
+  ASSERT_NE(report.kept_views, nullptr);
+  report.kept_views->commit();
+  EXPECT_TRUE(TrainingArchive(path("kept")).belong_to(model));
+  {
+    LearningReport dropped;
+    (void)learn(all_views(images), options, &dropped);
+  }
+  EXPECT_TRUE(TrainingArchive(path("kept")).belong_to(model)) << "what is not committed replaces nothing";
+}
+
+TEST_F(TrainingArchiveTest, AFullDiskIsAnErrorWhereverItFillsAndKeepsTheFormerOnes) {
+  write("one", 1);
+  keep("kept");
+  const auto before = read_file(path("kept"));
+  for (rlim_t i = 0; i < 10; ++i) {
+    const test::FullDisk disk(static_cast<rlim_t>(before.size()) * i / 10);
+    EXPECT_THROW(keep("kept"), FileError) << i;
+  }
+  EXPECT_EQ(read_file(path("kept")), before);
 }
 
 TEST_F(TrainingArchiveTest, AreNotTouchedWhereLearningFails) {

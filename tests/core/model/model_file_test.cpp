@@ -1,17 +1,25 @@
 #include "core/model/model_file.h"
 
+#include <cmath>
+#include <cstring>
 #include <fstream>
+#include <limits>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "core/base/error.h"
-#include "core/image/picture_file.h"
+#include "core/base/input_file.h"
+#include "core/model/model_check.h"
+#include "core/model/sealed_file.h"
 #include "core/recognition/recognizer.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/learned_world.h"
 
 namespace eigenpose {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
@@ -118,9 +126,12 @@ TEST_F(ModelFile, SaysWhatToDoAboutAnotherVersion) {
   const std::string text(bytes.begin(), bytes.begin() + 100);
   const auto at = text.find("version 3");
   ASSERT_NE(at, std::string::npos);
-  bytes[at + 8] = '9';
-  write(bytes);
-  EXPECT_THAT(refusal(), HasSubstr("version 9, this program reads version 3; learn it again"));
+  for (const char version : {'1', '2', '4', '9'}) {
+    bytes[at + 8] = static_cast<unsigned char>(version);
+    write(bytes);
+    EXPECT_THAT(refusal(), HasSubstr(std::string("is of version ") + version +
+                                     ", this program reads version 3; learn it again"));
+  }
 }
 
 TEST_F(ModelFile, RefusesWhatIsNoModel) {
@@ -128,6 +139,121 @@ TEST_F(ModelFile, RefusesWhatIsNoModel) {
   EXPECT_THAT(refusal(), HasSubstr("not an eigenpose model"));
   std::filesystem::remove(file());
   EXPECT_THAT(refusal(), HasSubstr("no such model"));
+}
+
+TEST_F(ModelFile, OpensNothingButPlainFiles) {
+  std::filesystem::remove(file());
+  ASSERT_EQ(::mkfifo(file().c_str(), 0600), 0);
+  EXPECT_THAT(refusal(), HasSubstr("is a pipe")) << "and nobody writes into it";
+}
+
+/// The only place in `bytes` where `value` stands.
+std::size_t place_of(const std::vector<unsigned char>& bytes, double value) {
+  std::array<unsigned char, sizeof value> text{};
+  std::memcpy(text.data(), &value, sizeof value);
+  const auto at = std::search(bytes.begin(), bytes.end(), text.begin(), text.end());
+  if (at == bytes.end() || std::search(at + 1, bytes.end(), text.begin(), text.end()) != bytes.end())
+    return 0;
+  return static_cast<std::size_t>(at - bytes.begin());
+}
+
+TEST_F(ModelFile, RefusesValuesThatCannotBeThoughTheSealIsGood) {
+  auto bytes = read_file(file());
+  const std::size_t at = place_of(bytes, testing::learned_world().model->objects[1].rejection_distance);
+  ASSERT_NE(at, 0U);
+  const auto refusal_of = [&](double value) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+    AtomicFile sealed(file());
+    sealed.write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    seal_file({"eigenpose model\n", 3, "", ""}, sealed);
+    sealed.commit();
+    return refusal();
+  };
+  EXPECT_EQ(refusal_of(0.25), "accepted") << "the seal is good";
+  for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), -1.0})
+    EXPECT_THAT(refusal_of(value), AllOf(HasSubstr("lab.model: object \"round\": the rejection distance is "),
+                                         HasSubstr("learn it again from its image sets")));
+}
+
+/// A way to spoil a model, and what is said of it.
+struct Spoiled {
+  std::string said;
+  std::function<void(Model&)> spoil;
+};
+
+TEST(ModelCheck, NamesWhatIsWrong) {
+  const double nan = std::nan("");
+  const std::vector<Spoiled> all = {
+      {"the mean: not every number is finite",
+       [&](Model& m) { m.eigenspace.mean(3) = static_cast<float>(nan); }},
+      {"the basis: not every number is finite",
+       [&](Model& m) { m.eigenspace.basis(3, 1) = std::numeric_limits<float>::infinity(); }},
+      {"the eigenvalues: not every number is finite", [&](Model& m) { m.eigenspace.eigenvalues(0) = nan; }},
+      {"the total scatter is -1", [&](Model& m) { m.eigenspace.total_scatter = -1.0; }},
+      {"do not fit together", [&](Model& m) { m.eigenspace.mean.conservativeResize(10); }},
+      {"the size of normalised views is 7", [&](Model& m) { m.normalization.size = 7; }},
+      {"the share of dirt is nan", [&](Model& m) { m.normalization.segmentation.dirt_share = nan; }},
+      {"sigmas) is -1", [&](Model& m) { m.normalization.segmentation.noise_sigmas = -1; }},
+      {"it has no object", [&](Model& m) { m.objects.clear(); }},
+      {"two objects are named \"one\"", [&](Model& m) { m.objects[1].name = m.objects[0].name; }},
+      {"\"a\\nlevel=error\" cannot be an object's name",
+       [&](Model& m) { m.objects[1].name = "a\nlevel=error"; }},
+      {"\"\\x1b[2J\" cannot", [&](Model& m) { m.objects[1].name = "\x1b[2J"; }},
+      {"the typical distance is nan", [&](Model& m) { m.objects[0].typical_distance = nan; }},
+      {"the rejection distance is -0.1", [&](Model& m) { m.objects[0].rejection_distance = -0.1; }},
+      {"degrees of freedom do not fit", [&](Model& m) { m.objects[0].dof_observable.clear(); }},
+      {"the manifold: not every number is finite",
+       [&](Model& m) {
+         const Manifold& old = m.objects[2].manifold;
+         Eigen::MatrixXd coefficients = old.coefficients();
+         coefficients(1, 1) = nan;
+         m.objects[2].manifold =
+             Manifold::from_coefficients({old.axes().begin(), old.axes().end()}, coefficients, old.degree());
+       }},
+      {"the manifold does not fit its eigenspace",
+       [&](Model& m) {
+         const Manifold& old = m.objects[2].manifold;
+         m.objects[2].manifold = Manifold::from_coefficients({old.axes().begin(), old.axes().end()},
+                                                             old.coefficients().topRows(3), old.degree());
+       }},
+      {"the basis: not every number is finite",
+       [&](Model& m) { m.objects[0].space->eigenspace.basis(0, 0) = static_cast<float>(nan); }},
+  };
+  ASSERT_NO_THROW(check_model(*testing::learned_world().model));
+  for (const Spoiled& spoiled : all) {
+    Model model = *testing::learned_world().model;
+    spoiled.spoil(model);
+    EXPECT_THAT([&] { check_model(model); }, ThrowsMessage<std::invalid_argument>(HasSubstr(spoiled.said)));
+  }
+}
+
+TEST_F(ModelFile, AModelThatCannotBeReadBackReplacesNone) {
+  Model model = *testing::learned_world().model;
+  model.objects[0].typical_distance = std::nan("");
+  EXPECT_THAT([&] { save_model(model, file()); },
+              ThrowsMessage<FileError>(AllOf(HasSubstr("lab.model: read back after writing, it "),
+                                             HasSubstr("typical distance is nan"),
+                                             HasSubstr("former file is unchanged"))));
+  EXPECT_EQ(refusal(), "accepted");
+}
+
+TEST_F(ModelFile, AFullDiskIsAnErrorWhereverItFillsAndKeepsTheFormerModel) {
+  const auto size = static_cast<rlim_t>(std::filesystem::file_size(file()));
+  const auto former = read_file(file());
+  std::vector<rlim_t> limits{0, 1, 511, 512, 600, 1000, 2048, 4096, size - 4096, size - 512, size - 1};
+  for (rlim_t i = 1; i < 20; ++i) limits.push_back(size * i / 20);
+  for (const rlim_t limit : limits) {
+    const test::FullDisk disk(limit);
+    EXPECT_THAT([&] { save_model(*testing::learned_world().model, file()); },
+                ThrowsMessage<FileError>(HasSubstr("former file is unchanged")))
+        << limit;
+  }
+  EXPECT_EQ(read_file(file()), former);
+  {
+    const test::FullDisk disk(size);
+    EXPECT_NO_THROW(save_model(*testing::learned_world().model, file())) << "it just fits";
+  }
+  EXPECT_EQ(read_file(file()), former) << "the same model is the same bytes";
 }
 
 TEST_F(ModelFile, SavingReplacesTheFormerFileOrLeavesIt) {

@@ -1,13 +1,17 @@
+#include <cmath>
 #include <filesystem>
+#include <functional>
+#include <limits>
 
-#include <gtest/gtest.h>
-#include <unistd.h>
+#include <gmock/gmock.h>
 
 #include "core/base/error.h"
 #include "core/learning/calibration/parts_calibration.h"
+#include "core/model/model_check.h"
 #include "core/model/model_file.h"
 #include "core/recognition/parts_recognizer.h"
 #include "tests/support/drawn_pictures.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -34,13 +38,25 @@ Model drawn_model() {
   return model;
 }
 
+Model read_back(const Model& model) {
+  const test::TemporaryFolder folder;
+  save_model(model, folder.path() / "a.model");
+  return load_model(folder.path() / "a.model");
+}
+
+/// The drawn model, its parts changed.
+Model with_parts(const std::function<void(PartsModel&)>& change) {
+  static const Model drawn = drawn_model();
+  Model model = drawn;
+  PartsModel parts = *model.parts;
+  change(parts);
+  model.parts = std::make_shared<const PartsModel>(std::move(parts));
+  return model;
+}
+
 TEST(PartsFile, AModelReadBackGivesTheSameAnswersInEveryBit) {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / ("parts_file_test_" + std::to_string(::getpid()) + ".h5");
-  const Model model = drawn_model();
-  save_model(model, file);
-  const Model read = load_model(file);
-  std::filesystem::remove(file);
+  const Model model = with_parts([](PartsModel&) {});
+  const Model read = read_back(model);
   ASSERT_NE(read.parts, nullptr);
   PartsRecognizer one(*model.parts);
   PartsRecognizer other(*read.parts);
@@ -61,6 +77,81 @@ TEST(PartsFile, AModelReadBackGivesTheSameAnswersInEveryBit) {
     EXPECT_EQ(model.parts->calibration[o].rejection_score, read.parts->calibration[o].rejection_score);
     EXPECT_EQ(model.parts->calibration[o].covered_share, read.parts->calibration[o].covered_share);
   }
+}
+
+TEST(PartsFile, KeepsTheVotingOptions) {
+  const Model model = with_parts([](PartsModel& parts) {
+    parts.voting = {{.cells = 1, .penalty = 0.02F}, 0.4F, 0.8F, 3, 0.1F};
+  });
+  const VotingOptions read = read_back(model).parts->voting;
+  EXPECT_EQ(read.tolerance.cells, 1);
+  EXPECT_EQ(read.tolerance.penalty, 0.02F);
+  EXPECT_EQ(read.width, 0.4F);
+  EXPECT_EQ(read.pooling, 0.8F);
+  EXPECT_EQ(read.background_rank, 3);
+  EXPECT_EQ(read.floor_weight, 0.1F);
+}
+
+TEST(PartsFile, KeepsTheSizesOfObjectsBesideOthersThatCameReadyCut) {
+  std::vector<std::vector<cv::Size>> extents(3, std::vector<cv::Size>(12));
+  for (int v = 0; v < 12; ++v)
+    extents[1][static_cast<std::size_t>(v)] = extents[2][static_cast<std::size_t>(v)] = {20 + v, 30};
+  EXPECT_EQ(read_back(with_parts([&](PartsModel& parts) { parts.extents = extents; })).parts->extents,
+            extents);
+  for (auto& of_object : extents) of_object.clear();
+  EXPECT_EQ(read_back(with_parts([&](PartsModel& parts) { parts.extents = extents; })).parts->extents,
+            extents)
+      << "all came ready-cut";
+}
+
+TEST(PartsFile, KeepsLanesOfMoreCandidatesThanSixteenBitsCount) {
+  const Model model = with_parts([](PartsModel& parts) {
+    parts.objects[0].candidates.resize(70'000, {0, true});
+    parts.objects[0].neighbours.resize(70'000, {-1, -1});
+    parts.objects[0].lane_candidate.back() = 69'999;
+  });
+  EXPECT_EQ(read_back(model).parts->objects[0].lane_candidate.back(), 69'999U);
+}
+
+TEST(PartsFile, RefusesPartsThatCannotBe) {
+  const double nan = std::nan("");
+  struct Spoiled {
+    std::string said;
+    std::function<void(PartsModel&)> spoil;
+  };
+  const std::vector<Spoiled> all = {
+      {"the noise of alignment is -1", [](PartsModel& p) { p.noise = -1.0; }},
+      {"the noise of alignment is nan", [&](PartsModel& p) { p.noise = nan; }},
+      {"the smallest rate is 1.5", [](PartsModel& p) { p.smallest_rate = 1.5; }},
+      {"the sure ratio is nan", [&](PartsModel& p) { p.sure_ratio = nan; }},
+      {"the least evidence of occluded objects is nan", [&](PartsModel& p) { p.covered_evidence = nan; }},
+      {"the step of learned windows is 0", [](PartsModel& p) { p.scale.learned = 0.0F; }},
+      {"the step of query windows is inf",
+       [](PartsModel& p) { p.scale.query = std::numeric_limits<float>::infinity(); }},
+      {"the background of windows is -1", [](PartsModel& p) { p.background[1] = -1.0F; }},
+      {"neither of colour nor of grey", [](PartsModel& p) { p.bands = 2; }},
+      {"the width of likeness is 0", [](PartsModel& p) { p.voting.width = 0.0F; }},
+      {"the pooling of neighbours is 2", [](PartsModel& p) { p.voting.pooling = 2.0F; }},
+      {"the rank of the background is 0", [](PartsModel& p) { p.voting.background_rank = 0; }},
+      {"the reach of windows (cells) is 99", [](PartsModel& p) { p.voting.tolerance.cells = 99; }},
+      {"object \"object1\": the rejection distance is nan",
+       [&](PartsModel& p) { p.calibration[1].rejection_distance = nan; }},
+      {"the sure distance is -1", [](PartsModel& p) { p.calibration[0].sure_distance = -1.0; }},
+      {"the typical distance is inf", [](PartsModel& p) { p.calibration[0].typical_distance = INFINITY; }},
+      {"the rejection score is nan", [&](PartsModel& p) { p.calibration[0].rejection_score = nan; }},
+      {"the typical score is -1", [](PartsModel& p) { p.calibration[0].typical_score = -1; }},
+      {"the covered share is nan", [&](PartsModel& p) { p.calibration[2].covered_share = nan; }},
+      {"a view that is not on the manifold", [](PartsModel& p) { p.objects[0].candidates[0].view = 12; }},
+      {"the windows do not fit together", [](PartsModel& p) { p.objects[0].neighbours.pop_back(); }},
+      {"the windows do not fit the objects", [](PartsModel& p) { p.poses.pop_back(); }},
+      {"the sizes of regions do not fit the views",
+       [](PartsModel& p) {
+         p.extents = {std::vector<cv::Size>(12, {3, 3}), {}, {}};
+       }},
+  };
+  for (const Spoiled& spoiled : all)
+    EXPECT_THAT([&] { check_model(with_parts(spoiled.spoil)); },
+                ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr(spoiled.said)));
 }
 
 TEST(PartsCalibration, RefusesARateThatIsNone) {
