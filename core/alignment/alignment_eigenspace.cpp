@@ -207,7 +207,8 @@ void PoseScale::warp(const PosePicture& picture, const Misalignment& misalignmen
 }
 
 AlignmentEigenspace AlignmentEigenspace::learn(const std::vector<SampleAxis>& axes,
-                                               const std::vector<PosePicture>& views) {
+                                               const std::vector<PosePicture>& views,
+                                               const Eigen::MatrixXd& poses) {
   if (views.size() < 2) {
     throw std::invalid_argument("a pose space needs at least 2 views, got " + std::to_string(views.size()));
   }
@@ -227,8 +228,8 @@ AlignmentEigenspace AlignmentEigenspace::learn(const std::vector<SampleAxis>& ax
     }
     span_of(pictures, side, scale, points);
     (side == coarse_side ? space.coarse_manifold_ : space.fine_manifold_) =
-        Manifold::interpolate(axes, points);
-    if (side == coarse_side && axes.size() == 1 && views.size() >= 4) {
+        Manifold::fit(axes, poses, points);
+    if (side == coarse_side && poses.size() == 0 && axes.size() == 1 && views.size() >= 4) {
       for (std::size_t v = 0; v < views.size(); ++v) {
         std::vector<SampleAxis> fewer = axes;
         fewer[0].samples.erase(fewer[0].samples.begin() + static_cast<std::ptrdiff_t>(v));

@@ -48,8 +48,9 @@ class AlignmentEigenspace {
   /// @param axes the grid of the views; @param views in the order of Manifold::interpolate (last axis
   /// fastest).
   /// @throws std::invalid_argument for fewer than two views or sizes that do not fit.
-  static AlignmentEigenspace learn(const std::vector<SampleAxis>& axes,
-                                   const std::vector<PosePicture>& views);
+  /// @param poses of the views, m × n, where they are no grid (see Manifold::fit).
+  static AlignmentEigenspace learn(const std::vector<SampleAxis>& axes, const std::vector<PosePicture>& views,
+                                   const Eigen::MatrixXd& poses = {});
 
   /// Rebuilds what a model file stores. @throws std::invalid_argument for sizes that do not fit.
   static AlignmentEigenspace from_parts(PoseScale coarse, PoseScale fine, Eigen::VectorXf pixel_mean,

@@ -237,8 +237,10 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
     training.push_back({&sets[s], std::move(split.learned)});
   }
   if (tests.empty()) throw std::invalid_argument("no view is left to test on; there are too few views");
+  LearningOptions learning = options.learning;
+  learning.bad_views = BadViews::refuse;  // objects are counted as their sets are: none may be missing
   const auto model =
-      std::make_shared<const Model>(learn(training, options.learning, &report.learning, progress, stop));
+      std::make_shared<const Model>(learn(training, learning, &report.learning, progress, stop));
   for (std::size_t s = 0; s < sets.size(); ++s) {
     ObjectEvaluation object;
     object.object = sets[s].object();

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <sstream>
+#include <stdexcept>
 
 #include "core/base/error.h"
 
 namespace eigenpose {
 namespace {
 
-constexpr double play_share = 0.002;  ///< of a DOF's range: 0.7° of a turn
+/// Values closer than this share of a DOF's range are one commanded position: 0.7° of a turn.
+constexpr double play_share = 0.002;
 
 /// Values of one DOF that count as one.
 struct Cluster {
@@ -56,26 +59,69 @@ AxisClusters cluster(const Dof& dof, std::span<const std::vector<double>> poses,
   return result;
 }
 
-std::string name_pose(const Workspace& workspace, const std::vector<SampleAxis>& axes, std::size_t cell) {
-  std::vector<std::size_t> at(axes.size());
-  for (std::size_t d = axes.size(); d-- > 0;) {
-    at[d] = cell % axes[d].samples.size();
-    cell /= axes[d].samples.size();
+/// Share of a grid's cells that must be taken for its own values to be the axes.
+constexpr double filled_grid = 0.5;
+/// Coefficients of a fit over views: below 1, so that the views say more than the penalty.
+constexpr double coefficients_per_view = 2.0 / 3.0;
+/// Appearance changes faster around a turn than along a DOF that does not close: steps of its range for each
+/// step of the other.
+constexpr double turn_detail = 4.0;
+
+/// Even steps over the values of each DOF, for poses that are no grid.
+std::vector<SampleAxis> even_axes(const std::vector<SampleAxis>& found, std::size_t views) {
+  double detail = 1.0;
+  std::size_t moving = 0;
+  for (const SampleAxis& axis : found) {
+    if (axis.samples.size() < 2) continue;
+    ++moving;
+    if (axis.dof.periodic) detail *= turn_detail;
   }
-  std::ostringstream text;
-  for (std::size_t d = 0; d < axes.size(); ++d)
-    text << (d > 0 ? ", " : "") << workspace[d].name << " " << axes[d].samples[at[d]] << " "
-         << workspace[d].unit;
-  return text.str();
+  const double wanted = coefficients_per_view * static_cast<double>(views) / detail;
+  const double steps =
+      std::pow(std::max(wanted, 1.0), 1.0 / static_cast<double>(std::max<std::size_t>(moving, 1)));
+  std::vector<SampleAxis> axes;
+  for (const SampleAxis& axis : found) {
+    const auto distinct = static_cast<double>(axis.samples.size());
+    if (distinct < 2) {
+      axes.push_back(axis);
+      continue;
+    }
+    const bool closed = axis.dof.periodic;
+    const double few = closed ? 3.0 : 2.0;
+    const auto count = static_cast<int>(
+        std::clamp(std::round(steps * (closed ? turn_detail : 1.0)), few, std::max(few, distinct)));
+    const double first = closed ? axis.dof.lower : axis.samples.front();
+    const double range = closed ? axis.dof.period() : axis.samples.back() - axis.samples.front();
+    SampleAxis even{axis.dof, {}};
+    for (int i = 0; i < count; ++i) even.samples.push_back(first + range * i / (closed ? count : count - 1));
+    axes.push_back(std::move(even));
+  }
+  return axes;
+}
+
+/// Refuses what no manifold goes through, before anything is learned from it.
+void check_fit(const LearnedGrid& grid, const std::string& object) {
+  try {
+    (void)Manifold::fit(grid.axes, grid.poses, Eigen::MatrixXd::Zero(1, grid.poses.cols()));
+  } catch (const std::invalid_argument& wrong) {
+    throw Error("\"" + object + "\": " + wrong.what());
+  }
 }
 
 }  // namespace
 
+std::string pose_text(const Workspace& workspace, std::span<const double> pose) {
+  std::ostringstream text;
+  for (std::size_t d = 0; d < workspace.size(); ++d)
+    text << (d > 0 ? ", " : "") << workspace[d].name << " " << pose[d] << " " << workspace[d].unit;
+  return text.str();
+}
+
 LearnedGrid find_learned_grid(const Workspace& workspace, std::span<const std::vector<double>> poses,
                               const std::string& object) {
   LearnedGrid grid;
-  std::vector<std::size_t> cell_of_view(poses.size(), 0);
-  std::size_t cells = 1;
+  std::vector<std::vector<std::size_t>> cell_of_view(poses.size());
+  double cells = 1.0;
   for (std::size_t d = 0; d < workspace.size(); ++d) {
     const Dof& dof = workspace[d];
     const double step = dof.period() / static_cast<double>(poses.size());
@@ -86,25 +132,28 @@ LearnedGrid find_learned_grid(const Workspace& workspace, std::span<const std::v
     const std::size_t n = axis.samples.size();
     if (dof.periodic && n == 2)
       throw Error("\"" + object + "\": views at only 2 values of " + dof.name + "; a turn needs at least 3");
-    for (std::size_t i = 0; i < poses.size(); ++i) cell_of_view[i] = cell_of_view[i] * n + axis.of_view[i];
-    cells *= n;
+    for (std::size_t i = 0; i < poses.size(); ++i) cell_of_view[i].push_back(axis.of_view[i]);
+    cells *= static_cast<double>(n);
     grid.axes.push_back({dof, std::move(axis.samples)});
   }
-  constexpr auto nobody = static_cast<std::size_t>(-1);
-  grid.order.assign(cells, nobody);
+  // The first view in each cell that has one, by cell.
+  std::map<std::vector<std::size_t>, std::size_t> taken;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    auto& place = grid.order[cell_of_view[i]];
-    if (place != nobody)
-      throw Error("\"" + object + "\" has two views at " + name_pose(workspace, grid.axes, cell_of_view[i]) +
-                  "; remove one of them");
-    place = i;
+    const auto [place, fresh] = taken.emplace(cell_of_view[i], i);
+    if (!fresh) grid.doubled.push_back({i, place->second});
   }
-  const auto gap = std::find(grid.order.begin(), grid.order.end(), nobody);
-  if (gap != grid.order.end())
-    throw Error("\"" + object + "\" has " + std::to_string(poses.size()) + " views for a grid of " +
-                std::to_string(cells) + " poses; there is none at " +
-                name_pose(workspace, grid.axes, static_cast<std::size_t>(gap - grid.order.begin())) +
-                "; acquire it to its end");
+  if (taken.size() < 2)
+    throw Error("\"" + object + "\": " + std::to_string(taken.size()) +
+                " different pose(s) make no manifold; at least 2 are needed");
+  for (const auto& [cell, view] : taken) grid.order.push_back(view);
+  if (static_cast<double>(taken.size()) == cells) return grid;
+  grid.poses.resize(static_cast<Eigen::Index>(workspace.size()), static_cast<Eigen::Index>(taken.size()));
+  for (std::size_t i = 0; i < grid.order.size(); ++i)
+    for (std::size_t d = 0; d < workspace.size(); ++d)
+      grid.poses(static_cast<Eigen::Index>(d), static_cast<Eigen::Index>(i)) =
+          workspace[d].canonical(poses[grid.order[i]][d]);
+  if (static_cast<double>(taken.size()) < filled_grid * cells) grid.axes = even_axes(grid.axes, taken.size());
+  check_fit(grid, object);
   return grid;
 }
 

@@ -24,11 +24,14 @@ struct LearningOptions {
   SolverOptions solver;
   int spline_degree = 2;  ///< 1, 2 or 3
   RejectionOptions rejection;
+  /// What is done about views that cannot be used: `leave_out` names them in the report and learns the rest.
+  BadViews bad_views = BadViews::leave_out;
   /// Without parts, learn each object's own eigenspace too: for a second look where two objects are close,
   /// and for pose where it is better.
   bool object_spaces = true;
-  /// Learn windows and pose spaces too: matching that bears covers and misalignment. Without, only the whole
-  /// region is matched. They look at brightness whatever the image type is; of range there are none.
+  /// Learn windows and alignment eigenspaces too: matching that bears occlusion and misalignment. Without,
+  /// only the whole region is matched. They use brightness whatever the image type is; of range there are
+  /// none.
   bool parts = true;
   MatchCalibrationOptions match;        ///< thresholds of the whole region, with parts
   PartsCalibrationOptions calibration;  ///< thresholds of windows
@@ -48,16 +51,17 @@ struct LearningOptions {
 
 struct LearningReport {
   std::size_t views = 0;
+  std::vector<LeftOut> left_out;  ///< views and objects that could not be used, in the order of the sets
   SolverReport solver;
   std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
   std::vector<MatchEvidence> match;         ///< the same of the aligned match; empty without parts
-  std::vector<OcclusionEvidence> covered;  ///< learned views as strangers to the windows; empty without parts
+  std::vector<OcclusionEvidence> covered;   ///< learned views shown as unknown objects; empty without parts
   Duration normalize_time{};
   Duration eigenspace_time{};
   Duration manifold_time{};
   Duration rejection_time{};
   Duration object_eigenspace_time{};
-  Duration parts_time{};  ///< windows, pose spaces and their calibration
+  Duration parts_time{};  ///< windows, alignment eigenspaces and their calibration
   Duration total_time{};
   /// The kept views, written and verified. Commit them when the model is saved: then neither a full disk nor
   /// a crash leaves a model with the views of another. Learning without a report commits them itself. Null
@@ -66,9 +70,11 @@ struct LearningReport {
 };
 
 /// Learns a model of all objects of `sets`. `options.normalization.cropped` is decided here: true when every
-/// set is cropped.
-/// @throws FileError, Error (too few views, no grid of poses, two sets of one object, nothing to be seen),
-/// std::invalid_argument for options out of range, Interrupted.
+/// set is cropped. Views that cannot be used, and objects without enough others, are left out and stand in
+/// the report; the other objects are learned without them.
+/// @throws FileError, Error (no object left, two sets of one object, too few components for the DOFs; with
+/// BadViews::refuse the first view that cannot be used), std::invalid_argument for options out of range,
+/// Interrupted.
 Model learn(std::span<const TrainingSet> sets, LearningOptions options, LearningReport* report = nullptr,
             const Progress& progress = {}, const std::stop_token& stop = {});
 

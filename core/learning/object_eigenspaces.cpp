@@ -14,7 +14,7 @@
 namespace eigenpose {
 namespace {
 
-/// More dimensions than a turn has views bring nothing; a grid of several DOFs is cut here.
+/// At most one component per view of a turn is useful; larger grids are cut off here.
 constexpr std::size_t most_components = 80;
 
 /// Mean of the errors, none counted as more than `most`.
@@ -69,14 +69,14 @@ std::vector<ObjectEigenspace> learn_object_eigenspaces(const TrainingViews& view
     const ObjectViews& object = objects[o];
     const Eigen::MatrixXf columns = reduced_views(views, object);
     Eigenspace space = span_of(columns);
-    Manifold manifold = Manifold::interpolate(object.axes, project(space, columns), degree);
+    Manifold manifold = Manifold::fit(object.axes, object.poses, project(space, columns), {.degree = degree});
     const auto errors = left_out_errors(object, 0, degree, [&](const Fold& fold) {
       const Eigen::MatrixXf kept = columns(Eigen::all, fold.kept);
       const Eigenspace without = span_of(kept);
       return FoldPoints{project(without, kept), project(without, columns(Eigen::all, fold.left_out))};
     });
     const auto& universal = evidence[o].left_out_errors.front();
-    // The own space is only asked where it agrees with the universal one within a step: larger errors do not
+    // The object's own eigenspace refines a pose within a step of the universal one: larger errors do not
     // count.
     const SampleAxis& axis = object.axes.front();
     const double step = axis.dof.period() / static_cast<double>(axis.samples.size());

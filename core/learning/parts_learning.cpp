@@ -50,6 +50,40 @@ std::array<int, 2> neighbours_of(const std::vector<SampleAxis>& axes, int view) 
   return {-1, -1};
 }
 
+/// The two nearest views of each, where views are no grid: near in steps of each axis. −1 where there are
+/// fewer.
+std::vector<std::array<int, 2>> nearest_views(const PartsViews& views) {
+  const auto count = static_cast<int>(views.count);
+  std::vector<std::array<int, 2>> result;
+  for (int v = 0; v < count; ++v) {
+    std::array<int, 2> near{-1, -1};
+    std::array<double, 2> distance{};
+    for (int other = 0; other < count; ++other) {
+      if (other == v) continue;
+      double squared = 0.0;
+      for (std::size_t a = 0; a < views.axes.size(); ++a) {
+        const auto& [dof, samples] = views.axes[a];
+        const auto row = static_cast<Eigen::Index>(a);
+        const double steps = dof.difference(views.poses(row, other), views.poses(row, v)) *
+                             static_cast<double>(samples.size()) / dof.period();
+        squared += steps * steps;
+      }
+      for (std::size_t place = 0; place < near.size(); ++place) {
+        if (near[place] >= 0 && squared >= distance[place]) continue;
+        if (place == 0) {
+          near[1] = near[0];
+          distance[1] = distance[0];
+        }
+        near[place] = other;
+        distance[place] = squared;
+        break;
+      }
+    }
+    result.push_back(near);
+  }
+  return result;
+}
+
 /// What a learned view is compared with: itself, or a picture made of it.
 struct Lane {
   std::size_t view = 0;
@@ -60,10 +94,15 @@ struct Lane {
 std::vector<Lane> make_lanes(const PartsViews& views, bool companions, PartsObject& object) {
   std::vector<Lane> lanes;
   const int count = static_cast<int>(views.count);
+  std::vector<std::array<int, 2>> neighbours;
+  if (views.poses.size() > 0)
+    neighbours = nearest_views(views);
+  else
+    for (int v = 0; v < count; ++v) neighbours.push_back(neighbours_of(views.axes, v));
   for (int copy = 0; copy < (companions ? 2 : 1); ++copy) {
     for (int v = 0; v < count; ++v) {
       object.candidates.push_back({v, copy == 1});
-      std::array<int, 2> near = neighbours_of(views.axes, v);
+      std::array<int, 2> near = neighbours[static_cast<std::size_t>(v)];
       for (int& n : near) {
         n = n < 0 ? n : n + copy * count;
       }
@@ -118,6 +157,7 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   model.objects.resize(count);
   model.poses.resize(count);
   model.calibration.resize(count);
+  model.view_poses.resize(count);
 
   // Cell maps of the plain views give background and window eigenspace.
   std::vector<std::size_t> first(count);  // view of each object
@@ -168,7 +208,8 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
     for (std::size_t v = 0; v < objects[o].count; ++v) {
       make_pose_picture(objects[o].view(v), pictures[v]);
     }
-    model.poses[o] = AlignmentEigenspace::learn(objects[o].axes, pictures);
+    model.poses[o] = AlignmentEigenspace::learn(objects[o].axes, pictures, objects[o].poses);
+    model.view_poses[o] = objects[o].poses.size() > 0 ? objects[o].poses : grid_poses(objects[o].axes);
     if (progress && o % 8 == 0) {
       progress({"learning pose spaces", o, count});
     }

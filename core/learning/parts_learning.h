@@ -19,6 +19,7 @@ struct PartsViews {
   std::vector<SampleAxis> axes;
   std::size_t count = 0;
   std::function<cv::Mat(std::size_t)> view;  ///< called from several threads
+  Eigen::MatrixXd poses = {};                ///< as ObjectViews::poses
 };
 
 struct PartsLearningOptions {

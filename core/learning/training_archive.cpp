@@ -57,6 +57,7 @@ void write_object(const Hdf5Group& group, const TrainingViews& views, const Obje
   }
   group.write("energies", energies);
   group.write("extents", extents);
+  if (object.poses.size() > 0) group.write("poses", object.poses);
   const Hdf5Group axes = group.make_group("axes");
   for (std::size_t a = 0; a < object.axes.size(); ++a)
     write_axis(axes.make_group(numbered(a)), object.axes[a]);
@@ -78,6 +79,13 @@ ObjectViews read_object(const Hdf5Group& group, std::size_t first) {
     dofs.push_back(object.axes.back().dof);
   }
   object.workspace = Workspace(std::move(dofs));
+  if (group.has("poses")) {
+    object.poses = group.read_doubles("poses");
+    object.count = static_cast<std::size_t>(object.poses.cols());
+    if (object.poses.rows() != static_cast<Eigen::Index>(object.workspace.size()) ||
+        !object.poses.allFinite())
+      throw Hdf5Failure("has objects whose parts do not fit together");
+  }
   const Eigen::MatrixXd extents = group.read_doubles("extents");
   if (extents.rows() != 2 || static_cast<std::size_t>(extents.cols()) != object.count)
     throw Hdf5Failure("has objects whose parts do not fit together");
@@ -240,12 +248,13 @@ KnownProducts known_products(std::span<const TrainingSet> sets, const TrainingVi
   if (first == sets.end()) return known;
   known.products = first->kept->products();
   if (known.products.size() == 0) return known;
-  for (std::size_t s = 0; s < sets.size(); ++s)
-    for (std::size_t i = 0; i < views.objects()[s].count; ++i)
-      known.rows.push_back(
-          sets[s].kept == first->kept
-              ? static_cast<Eigen::Index>(first->kept->objects()[sets[s].kept_object].first + i)
-              : -1);
+  for (std::size_t o = 0; o < views.objects().size(); ++o) {
+    const TrainingSet& set = sets[views.sets()[o]];
+    for (std::size_t i = 0; i < views.objects()[o].count; ++i)
+      known.rows.push_back(set.kept == first->kept
+                               ? static_cast<Eigen::Index>(first->kept->objects()[set.kept_object].first + i)
+                               : -1);
+  }
   return known;
 }
 

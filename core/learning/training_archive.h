@@ -9,7 +9,7 @@
 ///     /options         attributes solver, components, energy, …; normalization: as in a model
 ///     /objects/0000…   attributes name, cropped; pictures (bytes, view after view); energies (n); extents
 ///     (n×2);
-///                      axes/0… as in a model
+///                      axes/0… as in a model; poses (n×m) where the views are no grid
 ///     /products        inner products of all views, M × M; only where the gram solver made them
 ///
 /// For 3600 colour views of 64 × 64: 44 MB of pictures and 104 MB of products.
@@ -90,8 +90,8 @@ class TrainingArchiveWriter {
 std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<const std::string> leaving,
                                       std::span<const ImageSet> joining);
 
-/// The kept products of views that stand in `views`, whose objects were made from `sets` one by one. No rows
-/// where there are none.
+/// The kept products of views that stand in `views`, which was made from `sets`. No rows where there are
+/// none.
 KnownProducts known_products(std::span<const TrainingSet> sets, const TrainingViews& views);
 
 }  // namespace eigenpose

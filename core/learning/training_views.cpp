@@ -1,28 +1,22 @@
 #include "core/learning/training_views.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <mutex>
+#include <new>
+#include <numeric>
 #include <optional>
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/dataset/view_import.h"
 #include "core/image/appearance_maker.h"
 #include "core/learning/learned_grid.h"
 #include "core/learning/training_archive.h"
 
 namespace eigenpose {
 namespace {
-
-/// One view to be read: where from, and where to in the store.
-struct Job {
-  const ImageSet* images = nullptr;
-  std::size_t view = 0;
-  std::size_t object = 0;
-  std::size_t place = 0;
-};
 
 /// Segmenters and normalisers hold scratch memory; views are worked on by several threads.
 struct Scratch {
@@ -63,9 +57,10 @@ class ScratchPool {
 
 /// What all views of an object have in common.
 struct Kind {
+  Kind() = default;
   explicit Kind(const cv::Mat& image) : size(image.size()), type(image.type()) {}
   cv::Size size;
-  int type;
+  int type = 0;
   [[nodiscard]] std::string text() const {
     return std::to_string(size.width) + "x" + std::to_string(size.height) +
            (CV_MAT_CN(type) == 3           ? " colour"
@@ -113,6 +108,66 @@ ObjectViews kept_object(const TrainingSet& set, const NormalizationOptions& opti
   return object;
 }
 
+/// What was found of one view.
+struct TakenView {
+  std::string reason;  ///< why it cannot be used; empty where it can
+  Kind kind;
+  cv::Size extent;
+};
+
+/// The kind that most usable views have; of equally many, the first.
+Kind usual_kind(const std::vector<TakenView>& views) {
+  Kind usual;
+  std::ptrdiff_t most = 0;
+  for (const TakenView& view : views) {
+    if (!view.reason.empty()) continue;
+    const auto alike = std::count_if(views.begin(), views.end(), [&](const TakenView& other) {
+      return other.reason.empty() && other.kind == view.kind;
+    });
+    if (alike > most) {
+      most = alike;
+      usual = view.kind;
+    }
+    if (2 * most > static_cast<std::ptrdiff_t>(views.size())) break;
+  }
+  return usual;
+}
+
+/// What of a message is not the name of the file that it begins with.
+std::string without_file(const std::string& message, const std::filesystem::path& file) {
+  const std::string prefix = file.string() + ": ";
+  return message.starts_with(prefix) ? message.substr(prefix.size()) : message;
+}
+
+/// Work on one view after the other; each thread takes scratch memory of its own.
+class ViewNormalizer {
+ public:
+  explicit ViewNormalizer(const NormalizationOptions& options) : options_(options), pool_(options) {}
+
+  /// The picture's bytes and the energy of its appearance. @throws Error saying what is wrong with the view.
+  float normalize(const ImageSet& images, std::size_t view, TakenView& taken,
+                  std::vector<std::uint8_t>& bytes) {
+    const cv::Mat image = images.load(view);
+    taken.kind = Kind(image);
+    auto scratch = pool_.take();
+    normalize_learned_view(image, images.cropped(), scratch->segmenter, scratch->normalizer, scratch->picture,
+                           &taken.extent);
+    const bool range = is_range(options_);
+    keep(scratch->picture, range, bytes);
+    kept_numbers(bytes, range, scratch->picture);
+    const float energy = scratch->maker.make(scratch->picture, scratch->appearance);
+    pool_.give_back(std::move(scratch));
+    if (!(energy > 0.0F))
+      throw Error("shows nothing of image type \"" + image_type_name(options_) +
+                  "\"; learn another type or remove the view");
+    return energy;
+  }
+
+ private:
+  const NormalizationOptions& options_;
+  ScratchPool pool_;
+};
+
 }  // namespace
 
 float normalize_learned_view(const cv::Mat& image, bool cropped, Segmenter& segmenter, Normalizer& normalizer,
@@ -146,96 +201,188 @@ bool TrainingSet::cropped() const {
   return kept != nullptr ? kept->objects()[kept_object].cropped : images->cropped();
 }
 
+/// The views of one set on their way into the store.
+struct TrainingViews::Intake {
+  const TrainingSet* set = nullptr;
+  std::size_t index = 0;                    ///< of the set
+  std::vector<std::size_t> chosen = {};     ///< views of an image set
+  std::vector<TakenView> views = {};        ///< one a chosen view
+  std::size_t first = 0;                    ///< where its views are put before it is known which can be used
+  std::size_t count = 0;                    ///< so many
+  std::optional<std::string> refused = {};  ///< why none of them can be used
+
+  [[nodiscard]] std::filesystem::path file(std::size_t i) const {
+    return set->images->folder() / set->images->views()[chosen[i]].file;
+  }
+};
+
 TrainingViews::TrainingViews(std::span<const TrainingSet> sets, const ViewStoreOptions& options,
                              const Progress& progress, std::stop_token stop)
     : options_(options.normalization), length_(appearance_length(options_)) {
   if (sets.empty()) throw Error("there is no image set to learn from; import or acquire one");
-  const bool range = is_range(options_);
-  picture_bytes_ = picture_length(options_) * (range ? 2 : 1);
-  std::size_t count = 0;
-  std::vector<Job> jobs;
-  std::vector<std::optional<Kind>> kinds(sets.size());
+  std::vector<Intake> intakes;
+  std::size_t slots = 0;
   for (const TrainingSet& set : sets) {
+    Intake intake{&set, intakes.size()};
+    intake.first = slots;
     if (set.kept != nullptr) {
-      objects_.push_back(kept_object(set, options_, count));
-      count += objects_.back().count;
-      continue;
+      intake.count = kept_object(set, options_, 0).count;
+    } else {
+      intake.chosen = set.views;
+      if (intake.chosen.empty())
+        for (std::size_t i = 0; i < set.images->views().size(); ++i) intake.chosen.push_back(i);
+      if (is_range(options_) && !set.images->cropped())
+        intake.refused =
+            "holds views that show more than the object; range is learned from ready-cut views: import them "
+            "as "
+            "cropped";
+      intake.count = intake.refused ? 0 : intake.chosen.size();
+      intake.views.resize(intake.count);
     }
-    const auto& views = set.images->views();
-    if (range && !set.images->cropped())
-      throw FileError(
-          set.images->folder(),
-          "holds views that show more than the object; range is learned from ready-cut views: import them "
-          "with --views cropped");
-    std::vector<std::size_t> chosen = set.views;
-    if (chosen.empty())
-      for (std::size_t i = 0; i < views.size(); ++i) chosen.push_back(i);
-    if (chosen.size() < 2)
-      throw FileError(set.images->folder(),
-                      "has " + std::to_string(chosen.size()) + " view(s) of \"" + set.images->object() +
-                          "\" to learn from; at least 3 around a turn are " + "needed: acquire more");
-    std::vector<std::vector<double>> poses;
-    poses.reserve(chosen.size());
-    for (const std::size_t i : chosen) poses.push_back(views.at(i).q);
-    LearnedGrid grid = find_learned_grid(set.images->workspace(), poses, set.images->object());
-    const std::size_t object = objects_.size();
-    kinds[object].emplace(set.images->load(chosen[grid.order.front()]));
-    objects_.push_back({set.images->object(), set.images->workspace(), std::move(grid.axes), count,
-                        chosen.size(), std::vector<cv::Size>(options_.cropped ? 0 : chosen.size()),
-                        set.images->cropped()});
-    for (const std::size_t place : grid.order) jobs.push_back({set.images, chosen[place], object, count++});
+    slots += intake.count;
+    intakes.push_back(std::move(intake));
   }
+  allocate(slots, options);
+  for (const Intake& intake : intakes)
+    if (intake.set->kept != nullptr) take_kept(*intake.set, intake.first);
+  normalize(intakes, options, progress, stop);
+  for (Intake& intake : intakes) settle(intake, options.bad_views);
+  if (objects_.empty())
+    throw Error("none of " + std::to_string(sets.size()) + " image set(s) can be learned from. " +
+                std::find_if(left_out_.begin(), left_out_.end(), [](const LeftOut& what) {
+                  return what.whole_object;
+                })->text());
+  const std::size_t count = objects_.back().first + objects_.back().count;
+  energies_.resize(count);
+  if (!on_disk_) pictures_.resize(count * picture_bytes_);
+}
 
-  const std::size_t all = count * picture_bytes_;
+void TrainingViews::allocate(std::size_t views, const ViewStoreOptions& options) {
+  picture_bytes_ = picture_length(options_) * (is_range(options_) ? 2 : 1);
+  const std::size_t all = views * picture_bytes_;
   if (options.memory_limit > 0 && all > options.memory_limit)
     on_disk_ = std::make_unique<ScratchFile>(options.scratch_folder, all);
   else
     pictures_.resize(all);
-  energies_.resize(count);
-  for (std::size_t o = 0; o < sets.size(); ++o) {
-    if (sets[o].kept == nullptr) continue;
-    const ObjectViews& object = objects_[o];
-    std::vector<std::uint8_t> bytes(object.count * picture_bytes_);
-    sets[o].kept->read(sets[o].kept_object, bytes, std::span(energies_).subspan(object.first, object.count));
-    write_pictures(object.first, bytes);
-  }
+  energies_.resize(views);
+}
 
-  ScratchPool pool(options_);
+void TrainingViews::take_kept(const TrainingSet& set, std::size_t first) {
+  const std::size_t count = set.kept->objects()[set.kept_object].count;
+  std::vector<std::uint8_t> bytes(count * picture_bytes_);
+  set.kept->read(set.kept_object, bytes, std::span(energies_).subspan(first, count));
+  write_pictures(first, bytes);
+}
+
+void TrainingViews::normalize(std::vector<Intake>& intakes, const ViewStoreOptions& options,
+                              const Progress& progress, const std::stop_token& stop) {
+  std::vector<std::pair<Intake*, std::size_t>> jobs;
+  for (Intake& intake : intakes)
+    for (std::size_t i = 0; i < intake.views.size(); ++i) jobs.emplace_back(&intake, i);
+  ViewNormalizer normalizer(options_);
   std::mutex progress_mutex;
   std::size_t done = 0;  // guarded by progress_mutex
-  parallel_for(jobs.size(), options.threads, [&](std::size_t i) {
+  parallel_for(jobs.size(), options.threads, [&](std::size_t j) {
     if (stop.stop_requested()) throw Interrupted();
-    const Job& job = jobs[i];
-    ObjectViews& object = objects_[job.object];
-    const cv::Mat image = job.images->load(job.view);
-    const auto file = job.images->folder() / job.images->views()[job.view].file;
-    const Kind kind(image);
-    const Kind& first = *kinds[job.object];
-    if (kind != first)
-      throw FileError(file, "is " + kind.text() + ", the first view of \"" + job.images->object() + "\" is " +
-                                first.text() + "; all views of an object must be alike: acquire it again");
-    auto scratch = pool.take();
+    const auto [intake, i] = jobs[j];
+    TakenView& taken = intake->views[i];
+    std::vector<std::uint8_t> bytes;
     try {
-      cv::Size extent;
-      normalize_learned_view(image, job.images->cropped(), scratch->segmenter, scratch->normalizer,
-                             scratch->picture, &extent);
-      if (!options_.cropped) object.extents[job.place - object.first] = extent;
-      keep(scratch->picture, range, scratch->bytes);
-      kept_numbers(scratch->bytes, range, scratch->picture);
-      energies_[job.place] = scratch->maker.make(scratch->picture, scratch->appearance);
-      if (!(energies_[job.place] > 0.0F))
-        throw Error("shows nothing of image type \"" + image_type_name(options_) +
-                    "\"; learn another type or remove the view");
-    } catch (const FileError&) {
-      throw;
+      energies_[intake->first + i] =
+          normalizer.normalize(*intake->set->images, intake->chosen[i], taken, bytes);
+    } catch (const std::bad_alloc&) {
+      throw;  // says nothing of the view
     } catch (const std::exception& trouble) {
-      throw FileError(file, trouble.what());
+      taken.reason = without_file(trouble.what(), intake->file(i));
     }
-    write_pictures(job.place, scratch->bytes);
-    pool.give_back(std::move(scratch));
+    if (taken.reason.empty())
+      write_pictures(intake->first + i, bytes);
+    else if (options.bad_views == BadViews::refuse)
+      throw FileError(intake->file(i), taken.reason);
     const std::lock_guard lock(progress_mutex);
     if (progress) progress({"normalising", ++done, jobs.size()});
   });
+}
+
+void TrainingViews::leave_out(LeftOut what, BadViews bad_views) {
+  if (bad_views == BadViews::refuse) throw FileError(what.file, what.reason);
+  left_out_.push_back(std::move(what));
+}
+
+void TrainingViews::settle(Intake& intake, BadViews bad_views) {
+  const std::size_t place = objects_.empty() ? 0 : objects_.back().first + objects_.back().count;
+  std::vector<std::size_t> order(intake.count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (intake.set->kept != nullptr) {
+    objects_.push_back(kept_object(*intake.set, options_, place));
+    set_of_object_.push_back(intake.index);
+    move_views(intake, order, place);
+    return;
+  }
+  const ImageSet& images = *intake.set->images;
+  const Kind usual = usual_kind(intake.views);
+  std::vector<std::size_t> usable;
+  std::vector<std::vector<double>> poses;
+  for (std::size_t i = 0; i < intake.views.size(); ++i) {
+    TakenView& view = intake.views[i];
+    if (view.reason.empty() && view.kind != usual)
+      view.reason = "is " + view.kind.text() + ", most views of \"" + images.object() + "\" are " +
+                    usual.text() + "; all views of an object must be alike: acquire it again";
+    if (!view.reason.empty()) {
+      leave_out({images.object(), intake.file(i), false, view.reason}, bad_views);
+      continue;
+    }
+    usable.push_back(i);
+    poses.push_back(images.views()[intake.chosen[i]].q);
+  }
+  const std::size_t needed = least_views(images.workspace());
+  if (!intake.refused && usable.size() < needed)
+    intake.refused = "has " + std::to_string(usable.size()) + " view(s) of \"" + images.object() +
+                     "\" that can be used, of " + std::to_string(intake.chosen.size()) + "; at least " +
+                     std::to_string(needed) + " are needed" +
+                     (needed == 3 ? " to close a turn" : " to span a range") + ": acquire more";
+  LearnedGrid grid;
+  if (!intake.refused) try {
+      grid = find_learned_grid(images.workspace(), poses, images.object());
+    } catch (const Error& wrong) {
+      intake.refused = wrong.what();
+    }
+  if (intake.refused) {
+    leave_out({images.object(), images.folder(), true, *intake.refused}, bad_views);
+    return;
+  }
+  for (const DoubledView& doubled : grid.doubled)
+    leave_out({images.object(), intake.file(usable[doubled.view]), false,
+               "has the pose of " + intake.file(usable[doubled.same_as]).filename().string() + " (" +
+                   pose_text(images.workspace(), poses[doubled.view]) + "); remove one of them"},
+              bad_views);
+  ObjectViews object{
+      images.object(),  images.workspace(),   std::move(grid.axes), place, grid.order.size(), {},
+      images.cropped(), std::move(grid.poses)};
+  order.clear();
+  for (const std::size_t i : grid.order) {
+    order.push_back(usable[i]);
+    if (!options_.cropped) object.extents.push_back(intake.views[usable[i]].extent);
+  }
+  objects_.push_back(std::move(object));
+  set_of_object_.push_back(intake.index);
+  move_views(intake, order, place);
+}
+
+/// Puts views intake.first + order[i] to first + i. Never upwards: those of later sets stay.
+void TrainingViews::move_views(const Intake& intake, std::span<const std::size_t> order, std::size_t first) {
+  if (intake.first == first && std::is_sorted(order.begin(), order.end()) &&
+      (order.empty() || order.back() + 1 == order.size()))
+    return;
+  std::vector<std::uint8_t> bytes(order.size() * picture_bytes_);
+  std::vector<float> energies;
+  energies.reserve(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    read_pictures(intake.first + order[i], std::span(bytes).subspan(i * picture_bytes_, picture_bytes_));
+    energies.push_back(energies_[intake.first + order[i]]);
+  }
+  write_pictures(first, bytes);
+  std::copy(energies.begin(), energies.end(), energies_.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
 TrainingViews::~TrainingViews() = default;

@@ -1,7 +1,6 @@
 #pragma once
 
-/// The views a model is learned from: cut out, normalised, kept in memory or on disk, sorted into each
-/// object's grid of poses.
+/// The views a model is learned from: cut out, normalised, kept in memory or on disk, sorted by pose.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,13 +14,14 @@
 #include "core/base/progress.h"
 #include "core/base/scratch_file.h"
 #include "core/dataset/image_set.h"
+#include "core/dataset/left_out.h"
 #include "core/image/normalization.h"
 #include "core/manifold/manifold.h"
 #include "core/subspace/appearance_source.h"
 
 namespace eigenpose {
 
-class TrainingArchive;  // kept_views.h
+class TrainingArchive;  // training_archive.h
 
 /// What is learned of one object: views of an image set, or those that a former learning kept.
 struct TrainingSet {
@@ -39,13 +39,16 @@ struct TrainingSet {
 struct ObjectViews {
   std::string object;
   Workspace workspace;
-  /// The grid of poses: views stand in it with the last axis running fastest.
+  /// Where the coefficients of its manifold stand: see LearnedGrid.
   std::vector<SampleAxis> axes;
   std::size_t first = 0;  ///< its first view in the store
-  std::size_t count = 0;  ///< n₁·…·n_m
+  std::size_t count = 0;  ///< n₁·…·n_m where the views fill the grid of `axes`, any number where not
   /// Size of the region that each view was cut out of, pixels; empty where pictures came ready-cut.
   std::vector<cv::Size> extents;
   bool cropped = false;  ///< its pictures came ready-cut: it has no extents, or zeros where others have some
+  /// m × count: the pose of each view, where they are no grid. 0 × 0 where they fill the grid of `axes`, the
+  /// last axis running fastest.
+  Eigen::MatrixXd poses = {};
 };
 
 /// How views are made and kept.
@@ -56,6 +59,7 @@ struct ViewStoreOptions {
   /// from there in tiles. 0 means no limit.
   std::size_t memory_limit = 0;
   std::filesystem::path scratch_folder = {};  ///< empty: the system's folder for temporary files
+  BadViews bad_views = BadViews::leave_out;
 };
 
 /// All views: M normalised pictures, in memory or on disk, and the appearances that the image type makes of
@@ -65,15 +69,20 @@ struct ViewStoreOptions {
 /// are exact integers; other types are made anew at each reading.
 class TrainingViews final : public AppearanceSource {
  public:
-  /// Reads, cuts out and normalises every view of `sets`, on all cores.
-  /// @throws FileError naming the view (missing, truncated, another size than the first, nothing to be seen
-  /// in it); Error when an object has too few views, its poses are no grid, or kept views are normalised in
-  /// another way; Interrupted.
+  /// Reads, cuts out and normalises every view of `sets`, on all cores. A view that cannot be used (missing,
+  /// truncated, of another size than most of its object, nothing to be seen in it, at the pose of another) is
+  /// left out; so is an object whose other views are too few, or make no manifold.
+  /// @throws FileError or Error naming the first of these with BadViews::refuse; Error when no object is
+  /// left, or kept views are normalised in another way; Interrupted.
   TrainingViews(std::span<const TrainingSet> sets, const ViewStoreOptions& options, const Progress& progress,
                 std::stop_token stop);
   ~TrainingViews() override;
 
   [[nodiscard]] std::span<const ObjectViews> objects() const { return objects_; }
+  /// For each object the index of its set among those the store was made from.
+  [[nodiscard]] std::span<const std::size_t> sets() const { return set_of_object_; }
+  /// What could not be used, in the order of the sets.
+  [[nodiscard]] std::span<const LeftOut> left_out() const { return left_out_; }
   [[nodiscard]] const NormalizationOptions& normalization() const { return options_; }
   /// Bytes of pictures that stand in memory.
   [[nodiscard]] std::size_t resident() const { return pictures_.size(); }
@@ -96,19 +105,30 @@ class TrainingViews final : public AppearanceSource {
   [[nodiscard]] float energy(std::size_t i) const { return energies_[i]; }
 
  private:
+  struct Intake;
+
+  void allocate(std::size_t views, const ViewStoreOptions& options);
+  void take_kept(const TrainingSet& set, std::size_t first);
+  void normalize(std::vector<Intake>& intakes, const ViewStoreOptions& options, const Progress& progress,
+                 const std::stop_token& stop);
+  void settle(Intake& intake, BadViews bad_views);
+  void leave_out(LeftOut what, BadViews bad_views);
+  void move_views(const Intake& intake, std::span<const std::size_t> order, std::size_t first);
   void read_pictures(std::size_t first, std::span<std::uint8_t> bytes) const;
   void write_pictures(std::size_t first, std::span<const std::uint8_t> bytes);
 
   NormalizationOptions options_;
-  std::size_t length_ = 0;         ///< numbers of an appearance
+  std::size_t length_ = 0;         ///< components of an appearance
   std::size_t picture_bytes_ = 0;  ///< of one picture
   std::vector<ObjectViews> objects_;
+  std::vector<std::size_t> set_of_object_;
+  std::vector<LeftOut> left_out_;
   std::vector<std::uint8_t> pictures_;    ///< all, unless they are on disk
   std::unique_ptr<ScratchFile> on_disk_;  ///< else
   std::vector<float> energies_;           ///< of each view's appearance
 };
 
-/// The numbers of a picture as floats. @pre as many.
+/// Converts the pixels of `picture` to float. @pre numbers.size() == pixels × bands.
 void picture_numbers(const cv::Mat& picture, std::span<float> numbers);
 
 /// Cuts the one object out of a learned view and normalises it.

@@ -78,20 +78,22 @@ void check_object(const Model& model, const ModelObject& object) {
   check_manifold(of, object.space->manifold, space.components());
 }
 
-std::size_t grid_size(const Manifold& manifold) {
-  std::size_t views = 1;
-  for (const SampleAxis& axis : manifold.axes()) views *= axis.samples.size();
-  return views;
+/// The poses of the learned views. @return how many there are.
+std::size_t check_views(const std::string& of, const PartsModel& parts, std::size_t o, std::size_t dofs) {
+  const Eigen::MatrixXd& poses = parts.view_poses[o];
+  check_finite(of + "the poses of views", poses);
+  if (static_cast<std::size_t>(poses.rows()) != dofs)
+    refuse(of + "the poses of views do not fit its degrees of freedom");
+  return static_cast<std::size_t>(poses.cols());
 }
 
-void check_windows(const std::string& of, const PartsObject& object, const Manifold& manifold) {
-  const std::size_t views = grid_size(manifold);
+void check_windows(const std::string& of, const PartsObject& object, std::size_t views) {
   if (object.candidates.empty() || object.neighbours.size() != object.candidates.size() ||
       object.store.views() != object.lane_candidate.size())
     refuse(of + "the windows do not fit together");
   for (const Candidate& candidate : object.candidates)
     if (candidate.view < 0 || static_cast<std::size_t>(candidate.view) >= views)
-      refuse(of + "windows of a view that is not on the manifold");
+      refuse(of + "windows of a view that was not learned");
 }
 
 void check_calibration(const std::string& of, const PartsCalibration& calibration) {
@@ -132,7 +134,7 @@ void check_voting(const VotingOptions& voting) {
 void check_parts(const Model& model, const PartsModel& parts) {
   const std::size_t count = model.objects.size();
   if (parts.objects.size() != count || parts.poses.size() != count || parts.calibration.size() != count ||
-      (!parts.extents.empty() && parts.extents.size() != count))
+      parts.view_poses.size() != count || (!parts.extents.empty() && parts.extents.size() != count))
     refuse("the windows do not fit the objects");
   if (parts.bands != 1 && parts.bands != 3) refuse("the windows are neither of colour nor of grey pictures");
   for (const float level : parts.background) check_not_negative("the background of windows", level);
@@ -148,10 +150,11 @@ void check_parts(const Model& model, const PartsModel& parts) {
   check_range("the least evidence of occluded objects", parts.covered_evidence, -1e12, unlimited);
   for (std::size_t o = 0; o < count; ++o) {
     const std::string of = "object \"" + model.objects[o].name + "\": ";
-    check_windows(of, parts.objects[o], model.objects[o].manifold);
+    const std::size_t views = check_views(of, parts, o, model.objects[o].workspace.size());
+    check_windows(of, parts.objects[o], views);
     check_calibration(of, parts.calibration[o]);
     check_alignment(of, parts.poses[o]);
-    check_extents(of, parts, o, grid_size(model.objects[o].manifold));
+    check_extents(of, parts, o, views);
   }
 }
 

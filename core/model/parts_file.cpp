@@ -113,6 +113,19 @@ std::vector<cv::Size> read_extents(const Eigen::MatrixXd& matrix, const PartsObj
   return extents;
 }
 
+/// m × views: as written, or of the grid.
+Eigen::MatrixXd read_view_poses(const Hdf5Group& group, const AlignmentEigenspace& pose,
+                                const PartsObject& object) {
+  const auto axes = pose.coarse_manifold().axes();
+  const Eigen::MatrixXd poses = group.has("poses") ? group.read_doubles("poses") : grid_poses(axes);
+  const bool fits =
+      std::all_of(object.candidates.begin(), object.candidates.end(),
+                  [&](const Candidate& one) { return one.view >= 0 && one.view < poses.cols(); });
+  if (poses.rows() != static_cast<Eigen::Index>(axes.size()) || !fits || !poses.allFinite())
+    throw Hdf5Failure("has views whose poses do not fit together");
+  return poses;
+}
+
 }  // namespace
 
 void write_parts(const Hdf5Group& group, const PartsModel& parts) {
@@ -142,6 +155,8 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
     object.write("extents",
                  extents_matrix(o < parts.extents.size() ? parts.extents[o] : std::vector<cv::Size>()));
     const AlignmentEigenspace& pose = parts.poses[o];
+    if (o < parts.view_poses.size() && parts.view_poses[o] != grid_poses(pose.coarse_manifold().axes()))
+      object.write("poses", parts.view_poses[o]);
     object.write("pixel_mean", Eigen::MatrixXf(pose.pixel_mean()));
     write_scale(object.make_group("coarse"), pose.coarse(), pose.coarse_manifold());
     write_scale(object.make_group("fine"), pose.fine(), pose.fine_manifold());
@@ -188,6 +203,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
     parts.poses.push_back(AlignmentEigenspace::from_parts(
         read_scale(coarse), read_scale(fine), object.read_floats("pixel_mean"),
         read_manifold(coarse, objects[o].manifold), read_manifold(fine, objects[o].manifold)));
+    parts.view_poses.push_back(read_view_poses(object, parts.poses.back(), parts.objects.back()));
   }
   return parts;
 }

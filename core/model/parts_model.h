@@ -42,6 +42,8 @@ struct PartsModel {
   std::vector<PartsObject> objects;
   std::vector<AlignmentEigenspace> poses;     ///< one an object
   std::vector<PartsCalibration> calibration;  ///< one an object
+  /// For each object the pose of each learned view, m × views.
+  std::vector<Eigen::MatrixXd> view_poses;
   /// For each object the size of the region that each learned view was cut out of, pixels: zero for the views
   /// of an object that came ready-cut; nothing at all where all objects did. Separates objects that touch, as
   /// long as the camera stays where it was.

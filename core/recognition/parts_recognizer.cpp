@@ -37,30 +37,35 @@ constexpr double vote_evidence = 5.0;
 constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 
-/// Votes of the learned views next to a pose: the best of those within one step in every DOF.
+/// Votes of the learned views next to a pose: the best of those within one step in every DOF; where the views
+/// leave a gap there, of the nearest view.
+/// @param poses of the learned views.
 double votes_near(const std::vector<float>& votes, const PartsObject& object,
-                  const AlignmentEigenspace& space, std::span<const double> q) {
+                  const AlignmentEigenspace& space, const Eigen::MatrixXd& poses, std::span<const double> q) {
   const auto axes = space.coarse_manifold().axes();
+  constexpr double one_step = 1.01;  // with room for rounded ones
   double best = 0.0;
+  double nearest = 0.0;  // votes of the nearest view
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < object.candidates.size(); ++c) {
     if (object.candidates[c].mirrored) {
       continue;
     }
-    std::size_t rest = static_cast<std::size_t>(object.candidates[c].view);
-    bool near = true;
-    for (std::size_t a = axes.size(); a-- > 0 && near;) {
-      const std::size_t count = axes[a].samples.size();
-      const double sample = axes[a].samples[rest % count];
-      rest /= count;
-      // One learned step, with room for uneven ones.
-      near = std::fabs(axes[a].dof.difference(q[a], sample)) <=
-             1.01 * axes[a].dof.period() / static_cast<double>(count);
+    double steps = 0.0;
+    for (std::size_t a = 0; a < axes.size(); ++a) {
+      const double learned = poses(static_cast<Eigen::Index>(a), object.candidates[c].view);
+      steps = std::max(steps, std::fabs(axes[a].dof.difference(q[a], learned)) *
+                                  static_cast<double>(axes[a].samples.size()) / axes[a].dof.period());
     }
-    if (near) {
+    if (steps <= one_step) {
       best = std::max(best, static_cast<double>(votes[c]));
     }
+    if (steps < least) {
+      least = steps;
+      nearest = votes[c];
+    }
   }
-  return best;
+  return least <= one_step ? best : nearest;
 }
 
 }  // namespace
@@ -158,7 +163,8 @@ double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const Pa
   make_query_windows(map, model.space, model.scale, model.voting, aligned_windows);
   rematcher.match(aligned_windows, {&object, 1});
   rematcher.plain_votes(aligned_windows, object, aligned_votes);
-  return votes_near(aligned_votes, model.objects[object], model.poses[object], pose.q) /
+  return votes_near(aligned_votes, model.objects[object], model.poses[object], model.view_poses[object],
+                    pose.q) /
          aligned_windows.total_weight;
 }
 
@@ -224,7 +230,7 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
   for (const AlignedPose& found : aligner.align(posed(), space)) {
     PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
                    0.0};
-    pose.votes = votes_near(plain, parts, space, pose.q) / windows.total_weight;
+    pose.votes = votes_near(plain, parts, space, model.view_poses[object], pose.q) / windows.total_weight;
     pose.merit = merit(pose);
     answer.poses.push_back(pose);
   }
@@ -251,10 +257,9 @@ PoseNumbers PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vec
   const auto axes = model.poses[object].coarse_manifold().axes();
   PoseNumbers q;
   q.resize(axes.size());
-  std::size_t rest = static_cast<std::size_t>(parts.candidates[static_cast<std::size_t>(candidate)].view);
-  for (std::size_t a = axes.size(); a-- > 0;) {
-    q[a] = axes[a].samples[rest % axes[a].samples.size()];
-    rest /= axes[a].samples.size();
+  const int view = parts.candidates[static_cast<std::size_t>(candidate)].view;
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    q[a] = model.view_poses[object](static_cast<Eigen::Index>(a), view);
   }
   const auto& near = parts.neighbours[static_cast<std::size_t>(candidate)];
   if (axes.size() == 1 && near[0] >= 0 && near[1] >= 0) {

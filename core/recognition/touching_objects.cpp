@@ -51,16 +51,25 @@ bool filled(const cv::Rect& box, const cv::Mat& sums) {
   return sum >= 255.0 * least_filled * box.area();
 }
 
-/// The learned view nearest to a pose, in the order of the grid.
-std::size_t nearest_view(const AlignmentEigenspace& space, std::span<const double> q) {
+/// The learned view nearest to a pose, in steps of each DOF; of equally near ones the first.
+std::size_t nearest_view(const AlignmentEigenspace& space, const Eigen::MatrixXd& poses,
+                         std::span<const double> q) {
   const auto axes = space.coarse_manifold().axes();
-  std::size_t view = 0;
-  for (std::size_t a = 0; a < axes.size(); ++a) {
-    const auto away = [&](double sample) { return std::abs(axes[a].dof.difference(q[a], sample)); };
-    const auto nearest = std::ranges::min_element(axes[a].samples, {}, away);
-    view = view * axes[a].samples.size() + static_cast<std::size_t>(nearest - axes[a].samples.begin());
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (Eigen::Index v = 0; v < poses.cols(); ++v) {
+    double squared = 0.0;
+    for (std::size_t a = 0; a < axes.size(); ++a) {
+      const double steps = axes[a].dof.difference(q[a], poses(static_cast<Eigen::Index>(a), v)) *
+                           static_cast<double>(axes[a].samples.size()) / axes[a].dof.period();
+      squared += steps * steps;
+    }
+    if (squared < least) {
+      least = squared;
+      nearest = static_cast<std::size_t>(v);
+    }
   }
-  return view;
+  return nearest;
 }
 
 /// What a mask is made of.
@@ -153,7 +162,7 @@ bool TouchingObjects::look(const cv::Rect& box, std::vector<float>& picture) {
 }
 
 cv::Size TouchingObjects::learned_size(std::size_t object, std::span<const double> q) const {
-  return parts_.extents[object][nearest_view(parts_.poses[object], q)];
+  return parts_.extents[object][nearest_view(parts_.poses[object], parts_.view_poses[object], q)];
 }
 
 bool TouchingObjects::too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const {

@@ -16,6 +16,7 @@
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 #include "daemon/cli/learning_options.h"
+#include "daemon/cli/left_out_report.h"
 #include "daemon/cli/resemblance_report.h"
 #include "daemon/cli/service_client.h"
 
@@ -94,6 +95,7 @@ std::filesystem::path views_file(const std::string& model) {
 /// What a model is learned from, and how.
 struct Lesson {
   std::vector<ImageSet> images;
+  std::vector<LeftOut> left_out;  ///< sets that could not be opened
   std::unique_ptr<TrainingArchive> kept;
   std::vector<TrainingSet> sets;
   LearningOptions options;
@@ -101,7 +103,7 @@ struct Lesson {
 
 Lesson new_lesson(const LearnOptions& options) {
   Lesson lesson;
-  lesson.images = open_chosen_sets(options.sets, options.learning);
+  lesson.images = open_learned_sets(options.sets, options.learning, lesson.left_out);
   lesson.sets = all_views(lesson.images);
   lesson.options = learning_options(options.learning, lesson.images, options.sets);
   if (options.keep_views) lesson.options.kept_views = views_file(options.to);
@@ -121,8 +123,7 @@ Lesson next_lesson(const LearnOptions& options) {
                         ", which was learned anew since; learn it from its image sets, with --keep-views");
   lesson.options = lesson.kept->options();
   if (!options.sets.empty()) {
-    lesson.images = open_chosen_sets(options.sets, options.learning);
-    check_complete(lesson.images);
+    lesson.images = open_learned_sets(options.sets, options.learning, lesson.left_out);
     const std::string folder = absolute_folder(options.sets);
     if (!folder.starts_with(lesson.options.image_sets)) lesson.options.image_sets += ", " + folder;
   }
@@ -146,12 +147,15 @@ int run_learn(LearnOptions options, const CLI::App& command, const std::stop_tok
   if (options.to.empty()) throw Error("the model needs a name: add --to FILE");
   Lesson lesson = update ? next_lesson(options) : new_lesson(options);
   const auto folder = std::filesystem::path(options.to).parent_path();
+  if (options.learning.strict) lesson.options.bad_views = BadViews::refuse;
   lesson.options.scratch_folder = folder.empty() ? "." : folder;  // where there is room for the model
   ConsoleProgress progress;
   LearningReport report;
   const Model model = learn(lesson.sets, lesson.options, &report, progress.callback(), stop);
   save_model(model, options.to);
   progress.clear();
+  print_left_out(lesson.left_out);
+  print_left_out(report.left_out);
   print(model, report, options.to);
   return exit_done;
 }
@@ -175,6 +179,8 @@ void add_learn_command(CLI::App& app, CommandLine& line) {
       ->delimiter(',')
       ->needs(update);
   add_learning_options(*command, options->learning);
+  command->add_flag("--strict", options->learning.strict,
+                    "Refuse a view or a set that cannot be used, instead of leaving it out with a warning");
   for (const std::string& fixed : fixed_learning_options()) update->excludes(command->get_option(fixed));
   add_service_options(*command, options->service);
   command->callback([options, command, &line] {

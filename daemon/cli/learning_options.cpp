@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 
@@ -19,10 +21,20 @@ std::string type_help() {
   return text + "or a sum such as grey+gradient or grey:0.7+gradient:0.3";
 }
 
-/// The first view that is no colour picture.
+/// The type of a set's first picture that can be read; nothing where none can.
+std::optional<int> picture_type(const ImageSet& set) {
+  for (std::size_t i = 0; i < set.views().size(); ++i) try {
+      return set.load(i).type();
+    } catch (const FileError&) {
+      continue;  // named when it is learned
+    }
+  return std::nullopt;
+}
+
+/// The first set that holds no colour pictures.
 const ImageSet* first_grey(std::span<const ImageSet> sets) {
   for (const ImageSet& set : sets)
-    if (set.load(0).channels() != 3) return &set;
+    if (const auto type = picture_type(set); type && CV_MAT_CN(*type) != 3) return &set;
   return nullptr;
 }
 
@@ -45,7 +57,7 @@ void choose_type(const LearningArguments& arguments, std::span<const ImageSet> s
                       "\" are grey; colour is not to be had from them");
   if (is_range(options))
     for (const ImageSet& set : sets)
-      if (set.load(0).type() != CV_16UC1)
+      if (picture_type(set).value_or(CV_16UC1) != CV_16UC1)
         throw ConfigError("--type " + arguments.type + ": the views of \"" + set.object() +
                           "\" are not 16-bit grey pictures; they hold no range");
 }
@@ -90,25 +102,69 @@ std::vector<std::string> fixed_learning_options() {
           "--type",       "--solver", "--degree", "--whole-region"};
 }
 
-std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments) {
-  std::vector<ImageSet> sets = open_image_sets(folder);
+namespace {
+
+/// The name of the folder that a file of an image set stands in, or of the folder itself.
+std::string object_of(const std::filesystem::path& file) {
+  std::error_code error;
+  return (std::filesystem::is_directory(file, error) ? file : file.parent_path()).filename().string();
+}
+
+/// Only the sets named by --objects, if any. @param left_out objects that are there, but cannot be used.
+/// @throws ConfigError naming an object that is not there.
+std::vector<ImageSet> chosen(std::vector<ImageSet> sets, const std::string& folder,
+                             const LearningArguments& arguments, std::vector<LeftOut>& left_out) {
   if (arguments.objects.empty()) return sets;
-  for (const std::string& name : arguments.objects)
-    if (std::none_of(sets.begin(), sets.end(), [&](const ImageSet& set) { return set.object() == name; })) {
-      std::string known;
-      for (const ImageSet& set : sets) known += (known.empty() ? "" : ", ") + set.object();
-      throw ConfigError(std::string("--objects: there is no \"")
-                            .append(name)
-                            .append("\" in ")
-                            .append(folder)
-                            .append("; there are: ")
-                            .append(known));
-    }
-  std::erase_if(sets, [&](const ImageSet& set) {
-    return std::find(arguments.objects.begin(), arguments.objects.end(), set.object()) ==
-           arguments.objects.end();
-  });
+  const auto wanted = [&](const std::string& object) {
+    return std::find(arguments.objects.begin(), arguments.objects.end(), object) != arguments.objects.end();
+  };
+  for (const std::string& name : arguments.objects) {
+    const bool there =
+        std::any_of(sets.begin(), sets.end(), [&](const ImageSet& set) { return set.object() == name; }) ||
+        std::any_of(left_out.begin(), left_out.end(),
+                    [&](const LeftOut& what) { return what.object == name; });
+    if (there) continue;
+    std::string known;
+    for (const ImageSet& set : sets) known += (known.empty() ? "" : ", ") + set.object();
+    throw ConfigError(std::string("--objects: there is no \"")
+                          .append(name)
+                          .append("\" in ")
+                          .append(folder)
+                          .append("; there are: ")
+                          .append(known));
+  }
+  std::erase_if(sets, [&](const ImageSet& set) { return !wanted(set.object()); });
+  std::erase_if(left_out, [&](const LeftOut& what) { return !wanted(what.object); });
+  if (sets.empty()) throw ConfigError("--objects: none of them can be used. " + left_out.front().text());
   return sets;
+}
+
+}  // namespace
+
+std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments) {
+  std::vector<LeftOut> none;
+  return chosen(open_image_sets(folder), folder, arguments, none);
+}
+
+std::vector<ImageSet> open_learned_sets(const std::string& folder, const LearningArguments& arguments,
+                                        std::vector<LeftOut>& left_out) {
+  if (arguments.strict) {
+    std::vector<ImageSet> sets = open_chosen_sets(folder, arguments);
+    check_complete(sets);
+    return sets;
+  }
+  FoundImageSets found = find_image_sets(folder);
+  for (const FileError& wrong : found.left_out)
+    left_out.push_back({object_of(wrong.file()), {}, true, wrong.what()});
+  std::erase_if(found.sets, [&](const ImageSet& set) {
+    if (!set.complete())
+      left_out.push_back(
+          {set.object(), set.folder(), true, "is not complete; acquire or import it to its end"});
+    return !set.complete();
+  });
+  if (found.sets.empty())
+    throw ConfigError("there is no image set that can be used. " + left_out.front().text());
+  return chosen(std::move(found.sets), folder, arguments, left_out);
 }
 
 std::string absolute_folder(const std::string& folder) {

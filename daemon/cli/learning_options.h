@@ -30,6 +30,7 @@ struct LearningArguments {
   int degree = 2;
   unsigned threads = 0;
   std::vector<std::string> objects;
+  bool strict = false;
 };
 
 /// Adds --components, --energy, --size, --type, --color, --grey, --whole-region, --solver, --degree,
@@ -43,6 +44,11 @@ std::vector<std::string> fixed_learning_options();
 /// The image sets below `folder`, only those named by --objects if any.
 /// @throws FileError, ConfigError naming an object that is not there.
 std::vector<ImageSet> open_chosen_sets(const std::string& folder, const LearningArguments& arguments);
+
+/// The same for learning: sets that cannot be opened, or are not complete, are left out and named, unless
+/// --strict is given.
+std::vector<ImageSet> open_learned_sets(const std::string& folder, const LearningArguments& arguments,
+                                        std::vector<LeftOut>& left_out);
 
 /// As a model's provenance names it.
 std::string absolute_folder(const std::string& folder);

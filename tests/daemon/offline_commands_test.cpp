@@ -181,6 +181,76 @@ TEST_F(OfflineCommands, LetObjectsJoinAndLeaveAModelWithoutTheImagesOfTheOthers)
               AllOf(HasSubstr("no kept views"), HasSubstr("--keep-views")));
 }
 
+TEST_F(OfflineCommands, ImportATableOfPosesAndLearnIt) {
+  std::filesystem::create_directories(path("shots"));
+  std::string table = "object,file,table_deg\r\n";
+  for (int kind = 1; kind <= 2; ++kind)
+    for (int i = 0; i < 12; ++i) {
+      const double angle = 30.0 * i + (i % 3) * 4.5;
+      const std::string name = "shots/k" + std::to_string(kind) + ", " + std::to_string(i) + ".png";
+      const auto png = encode_png(testing::scene_with(kind, angle));
+      std::ofstream(path(name), std::ios::binary)
+          .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+      table += (kind == 1 ? "duck,\"" : "mug,\"") + name + "\"," + std::to_string(angle) + "\r\n";
+    }
+  std::ofstream(path("poses.csv"), std::ios::binary) << table;
+  const Ended imported = eigenpose("import table poses.csv --to sets");
+  ASSERT_EQ(imported.code, 0) << imported.output;
+  EXPECT_THAT(imported.output, HasSubstr("imported 2 objects, 24 views into sets"));
+  ASSERT_EQ(eigenpose("learn sets --to a.model --size 32").code, 0);
+  const auto png = encode_png(testing::scene_with(2, 130.0));
+  std::ofstream(path("mug.png"), std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+  const json seen = json::parse(eigenpose("recognize mug.png --model a.model --json").output);
+  ASSERT_EQ(seen[0]["outcomes"].size(), 1U);
+  EXPECT_EQ(seen[0]["outcomes"][0]["object"], "mug");
+  const Ended again = eigenpose("import table poses.csv --to sets");
+  EXPECT_EQ(again.code, 0) << again.output;
+  EXPECT_THAT(again.output, HasSubstr("2 of them stood there"));
+}
+
+TEST_F(OfflineCommands, SayWhichLineOfATableIsWrong) {
+  write_objects();
+  std::ofstream(path("poses.csv"), std::ios::binary)
+      << "file,object,table_deg\nmug.png,mug,0\nmug.png,duck,a\n";
+  const Ended wrong = eigenpose("import table poses.csv --to other");
+  EXPECT_EQ(wrong.code, 1);
+  EXPECT_THAT(wrong.output,
+              AllOf(HasSubstr("poses.csv"), HasSubstr("line 3"), HasSubstr("table_deg is \"a\"")));
+  const Ended option = eigenpose("import table poses.csv --to other --ignore colour");
+  EXPECT_EQ(option.code, 1);
+  EXPECT_THAT(option.output, HasSubstr("line 3"));
+  std::ofstream(path("poses.csv"), std::ios::binary)
+      << "file,object,table_deg\nmug.png,mug,0\nmug.png,duck,9\n";
+  const Ended unknown = eigenpose("import table poses.csv --to other --ignore colour");
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_THAT(unknown.output, HasSubstr("\"colour\" is to be ignored"));
+  EXPECT_FALSE(std::filesystem::exists(path("other")));
+}
+
+TEST_F(OfflineCommands, LearnLeavesOutWhatCannotBeUsedUnlessStrict) {
+  write_objects();
+  std::filesystem::resize_file(path("sets/mug/000003.png"), 200);
+  std::filesystem::resize_file(path("sets/duck/000000.png"), 200);
+  std::filesystem::create_directories(path("sets/broken"));
+  std::ofstream(path("sets/broken/set.json")) << "{";
+  ImageSetWriter(path("sets"), "begun", turntable_workspace(), json::object())
+      .add(testing::scene_with(1, 0.0), {0.0});
+  const Ended learned = eigenpose("learn sets --to a.model --size 32 --whole-region");
+  ASSERT_EQ(learned.code, 0) << learned.output;
+  for (const char* named : {"left out mug: sets/mug/000003.png: ", "left out duck: sets/duck/000000.png: ",
+                            "left out broken: ", "left out begun: ", "learned 2 objects from 34 views"})
+    EXPECT_THAT(learned.output, HasSubstr(named));
+  std::filesystem::remove_all(path("sets/broken"));
+  EXPECT_THAT(eigenpose("learn sets --to b.model --size 32 --whole-region --strict").output,
+              AllOf(HasSubstr("begun"), HasSubstr("not complete")));
+  std::filesystem::remove_all(path("sets/begun"));
+  const Ended strict = eigenpose("learn sets --to b.model --size 32 --whole-region --strict --objects mug");
+  EXPECT_EQ(strict.code, 1);
+  EXPECT_THAT(strict.output, HasSubstr("000003.png"));
+  EXPECT_FALSE(std::filesystem::exists(path("b.model")));
+}
+
 TEST_F(OfflineCommands, EverySearchSaysTheSame) {
   write_objects();
   ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region").code, 0);

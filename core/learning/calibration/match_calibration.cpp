@@ -34,7 +34,7 @@ constexpr double most_growth = 64.0;
 /// Of new views, so many show what could not be seen coming at the step before.
 constexpr double sudden_share = 0.02;
 /// Moved views that say enough of all objects together.
-constexpr std::size_t most_moved = 4000;
+constexpr std::size_t most_probed = 4000;
 constexpr double most_sure_ratio = 0.3;
 constexpr double sure_margin = 0.8;
 
@@ -69,6 +69,7 @@ class ThinnedManifolds {
   };
 
   [[nodiscard]] Thinned thin(std::size_t d, std::size_t every, std::size_t from) const;
+  [[nodiscard]] Thinned thin_scattered(std::size_t every, std::size_t from) const;
 
   const ObjectViews& object_;
   Eigen::Ref<const Eigen::MatrixXd> points_;
@@ -76,9 +77,29 @@ class ThinnedManifolds {
   std::map<std::array<std::size_t, 3>, Thinned> made_;
 };
 
+/// Every n-th view of those that are no grid, in the order of their poses, but not `from`: each of its
+/// neighbours is n/2 views away.
+std::vector<Eigen::Index> thinned_views(std::size_t count, std::size_t every, std::size_t from) {
+  std::vector<Eigen::Index> kept;
+  for (std::size_t i = 0; i < count; ++i)
+    if ((i + every - from % every) % every == every / 2) kept.push_back(static_cast<Eigen::Index>(i));
+  return kept;
+}
+
 /// Of few views only the one is left out.
 bool too_few_to_thin(std::size_t values) {
   return values < 6;
+}
+
+ThinnedManifolds::Thinned ThinnedManifolds::thin_scattered(std::size_t every, std::size_t from) const {
+  const std::vector<Eigen::Index> kept = thinned_views(object_.count, every, from);
+  const Eigen::MatrixXd poses = object_.poses(Eigen::all, kept);
+  if (kept.size() < 3 || !Manifold::undetermined_dof(object_.axes, poses).empty()) return {};
+  Thinned result;
+  result.manifold = std::make_unique<Manifold>(
+      Manifold::fit(object_.axes, poses, points_(Eigen::all, kept), {.degree = degree_}));
+  result.search = make_search("tree", {result.manifold.get(), 1});
+  return result;
 }
 
 ThinnedManifolds::Thinned ThinnedManifolds::thin(std::size_t d, std::size_t every, std::size_t from) const {
@@ -108,14 +129,16 @@ ThinnedManifolds::Thinned ThinnedManifolds::thin(std::size_t d, std::size_t ever
 
 std::optional<double> ThinnedManifolds::squared_distance(std::size_t d, std::size_t every, std::size_t from,
                                                          const Eigen::VectorXf& point) {
-  const std::size_t values = object_.axes[d].samples.size();
+  const bool scattered = object_.poses.size() > 0;
+  const std::size_t values = scattered ? object_.count : object_.axes[d].samples.size();
   if (values < 3 || (every > 2 && values < 3 * every)) return std::nullopt;
-  if (!object_.axes[d].dof.periodic && (from == 0 || from + 1 == values)) return std::nullopt;
+  if (!scattered && !object_.axes[d].dof.periodic && (from == 0 || from + 1 == values)) return std::nullopt;
   // Values a whole number of thinned steps apart leave the same views.
-  if (!too_few_to_thin(values)) from %= every;
+  if (scattered || !too_few_to_thin(values)) from %= every;
   const std::array<std::size_t, 3> key{d, every, from};
   auto made = made_.find(key);
-  if (made == made_.end()) made = made_.emplace(key, thin(d, every, from)).first;
+  if (made == made_.end())
+    made = made_.emplace(key, scattered ? thin_scattered(every, from) : thin(d, every, from)).first;
   if (!made->second.search) return std::nullopt;
   std::array<ClosestPoint, 1> nearest;
   if (made->second.search->nearest_into(point, nearest) == 0) return std::nullopt;
@@ -144,7 +167,9 @@ std::vector<Probe> probe_object(const Model& model, const TrainingViews& views,
   ThinnedManifolds thinned(object, points, model.objects[o].manifold.degree());
   const int size = model.normalization.size;
   const int bands = picture_bands(model.normalization);
-  const std::size_t dofs = object.axes.size();
+  const bool scattered = object.poses.size() > 0;
+  // Views that are no grid are thinned once, over all DOFs together.
+  const std::size_t dofs = scattered ? 1 : object.axes.size();
 
   AlignedMatch match(model, search, std::numeric_limits<double>::infinity());
   std::mt19937 random(static_cast<std::uint32_t>(o + 1));
@@ -168,7 +193,7 @@ std::vector<Probe> probe_object(const Model& model, const TrainingViews& views,
       for (std::size_t t = 0; t < thinnings.size(); ++t) {
         std::size_t inner = object.count;
         for (std::size_t d = 0; d < dofs && probe.missed[t] >= 0.0; ++d) {
-          const std::size_t values = object.axes[d].samples.size();
+          const std::size_t values = scattered ? object.count : object.axes[d].samples.size();
           inner /= values;
           const auto squared = thinned.squared_distance(d, thinnings[t], v / inner % values, match.point());
           probe.missed[t] = squared ? probe.missed[t] + std::max(0.0, *squared - probe.full) : -1.0;
@@ -294,7 +319,7 @@ std::vector<MatchEvidence> measure_match(const Model& model, const TrainingViews
                                 ", allowed are 0 to 0.5; that of accepted strangers is " +
                                 std::to_string(options.stranger_rate) + ", allowed are 0 to 1");
   if (options.moved_views < 1) throw std::invalid_argument("calibration needs at least one moved view");
-  const std::size_t copies = std::clamp<std::size_t>(most_moved / views.count(), 1, options.moved_views);
+  const std::size_t copies = std::clamp<std::size_t>(most_probed / views.count(), 1, options.moved_views);
   std::vector<Manifold> manifolds;
   for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
   const auto search = make_search("tree", manifolds);

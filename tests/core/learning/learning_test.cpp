@@ -11,16 +11,19 @@ namespace eigenpose {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::SceneKnobs;
 
 class Learning : public ::testing::Test {
  protected:
   [[nodiscard]] const std::filesystem::path& root() const { return folder_.path(); }
-  [[nodiscard]] std::string refusal() const {
+  [[nodiscard]] std::string refusal(BadViews bad_views = BadViews::refuse) const {
     try {
       const auto sets = open_image_sets(root());
-      (void)learn(all_views(sets), testing::small_learning());
+      LearningOptions options = testing::small_learning();
+      options.bad_views = bad_views;
+      (void)learn(all_views(sets), options);
     } catch (const Error& error) {
       return error.what();
     }
@@ -158,6 +161,148 @@ TEST_F(Learning, NamesAViewThatShowsNothingOrHalfTheObject) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("000002.png"), HasSubstr("border")));
 }
 
+TEST_F(Learning, LeavesOutViewsThatCannotBeUsedByName) {
+  auto pictures = turn(12);
+  pictures[2] = testing::empty_scene({}, 1);
+  SceneKnobs aside;
+  aside.x = 5.0;
+  pictures[4] = testing::scene_with(1, 120.0, aside);
+  SceneKnobs larger;
+  larger.width = 200;
+  pictures[6] = testing::scene_with(1, 180.0, larger);
+  write("mug", pictures);
+  testing::write_turn(root(), "other", 2, 12);
+  std::filesystem::resize_file(root() / "mug/000008.png", 300);
+  std::filesystem::remove(root() / "mug/000010.png");
+  const auto sets = open_image_sets(root());
+  LearningReport report;
+  const Model model = learn(all_views(sets), testing::small_learning(), &report);
+  std::vector<std::string> texts;
+  for (const LeftOut& what : report.left_out) {
+    EXPECT_EQ(what.object, "mug");
+    EXPECT_FALSE(what.whole_object);
+    texts.push_back(what.text());
+  }
+  EXPECT_THAT(texts,
+              ElementsAre(AllOf(HasSubstr("000002.png"), HasSubstr("nothing that stands out")),
+                          AllOf(HasSubstr("000004.png"), HasSubstr("border")),
+                          AllOf(HasSubstr("000006.png"), HasSubstr("200x120"), HasSubstr("160x120")),
+                          AllOf(HasSubstr("000008.png"), HasSubstr("truncated")), HasSubstr("000010.png")));
+  ASSERT_EQ(model.objects.size(), 2U);
+  EXPECT_EQ(model.objects[0].views, 7U);
+  EXPECT_THAT(model.objects[0].manifold.axes()[0].samples, ElementsAre(0, 30, 90, 150, 210, 270, 330));
+  EXPECT_EQ(report.views, 19U);
+}
+
+TEST_F(Learning, IsTheLearningOfTheViewsThatAreLeft) {
+  write("mug", turn(12));
+  testing::write_turn(root(), "other", 2, 12);
+  const auto sets = open_image_sets(root());
+  std::vector<TrainingSet> chosen = all_views(sets);
+  for (std::size_t i = 0; i < 12; ++i)
+    if (i != 0 && i != 5) chosen[0].views.push_back(i);
+  LearningOptions options = testing::small_learning();
+  options.parts = true;
+  const Model expected = learn(chosen, options);
+  for (const char* name : {"mug/000000.png", "mug/000005.png"})
+    std::filesystem::resize_file(root() / name, 300);
+  const Model model = learn(all_views(sets), options);
+  EXPECT_EQ(model.eigenspace.basis, expected.eigenspace.basis);
+  for (std::size_t o = 0; o < 2; ++o) {
+    EXPECT_EQ(model.objects[o].manifold.coefficients(), expected.objects[o].manifold.coefficients());
+    EXPECT_EQ(model.parts->extents[o], expected.parts->extents[o]);
+    EXPECT_EQ(model.rejection_distance(o), expected.rejection_distance(o));
+  }
+}
+
+TEST_F(Learning, LeavesOutViewsFromDiskAsFromMemory) {
+  write("mug", turn(24));
+  testing::write_turn(root(), "other", 2, 24);
+  std::filesystem::resize_file(root() / "mug/000005.png", 300);
+  const auto sets = open_image_sets(root());
+  const NormalizationOptions options = testing::small_learning().normalization;
+  const TrainingViews memory(all_views(sets), {options, 2}, {}, {});
+  const TrainingViews disk(all_views(sets), {options, 2, 1, root()}, {}, {});
+  ASSERT_EQ(disk.resident(), 0U);
+  ASSERT_EQ(memory.count(), 47U);
+  EXPECT_EQ(memory.resident(), 47 * picture_length(options));
+  EXPECT_EQ(disk.pictures(0, 47), memory.pictures(0, 47));
+  for (std::size_t i = 0; i < 47; ++i) EXPECT_EQ(disk.energy(i), memory.energy(i));
+}
+
+TEST_F(Learning, SortsViewsThatStandInAnyOrder) {
+  testing::write_turn(root(), "mug", 1, 8);
+  const auto sets = open_image_sets(root());
+  std::vector<TrainingSet> shuffled = all_views(sets);
+  shuffled[0].views = {5, 2, 7, 0, 1, 6, 4, 3};
+  const NormalizationOptions options = testing::small_learning().normalization;
+  const TrainingViews expected(all_views(sets), {options, 2}, {}, {});
+  const TrainingViews views(shuffled, {options, 2}, {}, {});
+  EXPECT_EQ(views.pictures(0, 8), expected.pictures(0, 8));
+  EXPECT_EQ(views.objects()[0].extents, expected.objects()[0].extents);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(views.energy(i), expected.energy(i));
+}
+
+TEST_F(Learning, LeavesOutTheSecondViewAtAPose) {
+  ImageSetWriter writer(root(), "mug", turntable_workspace(), nlohmann::json::object(),
+                        {.sync_every_view = false});
+  for (const double angle : {0.0, 60.0, 120.0, 120.01, 180.0, 240.0, 300.0})
+    writer.add(testing::scene_with(1, angle), {angle});
+  writer.finish();
+  EXPECT_THAT(refusal(),
+              AllOf(HasSubstr("000003.png"), HasSubstr("the pose of 000002.png"), HasSubstr("table 120")));
+  LearningReport report;
+  const auto sets = open_image_sets(root());
+  EXPECT_EQ(learn(all_views(sets), testing::small_learning(), &report).objects[0].views, 6U);
+  ASSERT_EQ(report.left_out.size(), 1U);
+  EXPECT_EQ(report.left_out[0].file, root() / "mug/000003.png");
+}
+
+TEST_F(Learning, LeavesOutAnObjectOfWhichTooFewViewsAreLeftAndLearnsTheOthers) {
+  write("few", turn(2));
+  write("none", {}, false);
+  testing::write_turn(root(), "other", 2, 12);
+  const auto sets = open_image_sets(root());
+  LearningReport report;
+  const Model model = learn(all_views(sets), testing::small_learning(), &report);
+  ASSERT_EQ(model.objects.size(), 1U);
+  EXPECT_EQ(model.objects[0].name, "other");
+  ASSERT_EQ(report.left_out.size(), 2U);
+  EXPECT_TRUE(report.left_out[0].whole_object);
+  EXPECT_THAT(report.left_out[0].text(),
+              AllOf(HasSubstr("few"), HasSubstr("2 view(s)"), HasSubstr("at least 3")));
+  EXPECT_THAT(report.left_out[1].text(), HasSubstr("0 view(s)"));
+  EXPECT_THAT(refusal(BadViews::refuse), AllOf(HasSubstr("few"), HasSubstr("2 view(s)")));
+}
+
+TEST_F(Learning, RefusesWhereNothingIsLeft) {
+  write("one", turn(1));
+  write("two", turn(2));
+  EXPECT_THAT(refusal(BadViews::leave_out),
+              AllOf(HasSubstr("none of 2 image set(s)"), HasSubstr("1 view(s)")));
+}
+
+TEST_F(Learning, TakesUnevenViewsWithAGap) {
+  ImageSetWriter writer(root(), "mug", turntable_workspace(), nlohmann::json::object(),
+                        {.sync_every_view = false});
+  for (const double angle : {0.0, 7.5, 21.0, 40.0, 55.25, 70.0, 90.0, 102.0, 125.0, 140.0, 160.0, 181.5,
+                             200.0, 219.0, 240.0, 258.0, 275.0, 290.0, 300.0})
+    writer.add(testing::scene_with(1, angle), {angle});
+  writer.finish();
+  testing::write_turn(root(), "other", 2, 12);
+  LearningOptions options = testing::small_learning();
+  options.parts = true;
+  const auto sets = open_image_sets(root());
+  Recognizer recognizer(std::make_shared<const Model>(learn(all_views(sets), options)));
+  for (const double angle : {48.0, 133.0, 210.0}) {
+    const auto outcomes = recognizer.recognize(testing::scene_with(1, angle));
+    ASSERT_EQ(outcomes.size(), 1U);
+    ASSERT_TRUE(outcomes[0].best) << angle;
+    EXPECT_EQ(outcomes[0].best->object, "mug");
+    EXPECT_NEAR(outcomes[0].best->q[0], angle, 4.0) << "a quarter of the local step";
+  }
+}
+
 TEST_F(Learning, EndsWhenAskedTo) {
   testing::write_turn(root(), "one", 1, 12);
   const auto sets = open_image_sets(root());
@@ -167,20 +312,59 @@ TEST_F(Learning, EndsWhenAskedTo) {
                Interrupted);
 }
 
+/// Seen from `table`, with brightness that rises or falls across the object as the light moves.
+cv::Mat lit(double table, double light) {
+  cv::Mat picture = testing::scene_with(1, table);
+  for (int y = 0; y < picture.rows; ++y)
+    for (int x = 0; x < picture.cols; ++x) {
+      auto& pixel = picture.at<cv::Vec3b>(y, x);
+      if (pixel[0] + pixel[1] + pixel[2] < 90) continue;
+      for (int b = 0; b < 3; ++b)
+        pixel[b] = cv::saturate_cast<unsigned char>(pixel[b] * (0.6 + light * (x - 80) / 2400.0));
+    }
+  return picture;
+}
+
+Workspace turn_under_light() {
+  return Workspace({{"table", "deg", 0.0, 360.0, true}, {"light", "deg", -40.0, 40.0, false}});
+}
+
+TEST_F(Learning, LearnsPosesThatAreNoGrid) {
+  // A grid with a tenth of its views missing, and a plan that jumps about.
+  std::vector<std::vector<double>> holes;
+  for (int table = 0; table < 360; table += 20)
+    for (int light = -40; light <= 40; light += 20)
+      if ((table / 20 * 5 + light / 20) % 10 != 3) holes.push_back({1.0 * table, 1.0 * light});
+  std::vector<std::vector<double>> jumps;
+  for (int i = 0; i < 110; ++i)
+    jumps.push_back({std::fmod(137.508 * i, 360.0), -40.0 + std::fmod(49.443 * i, 80.0)});
+  for (const auto& poses : {holes, jumps}) {
+    std::filesystem::remove_all(root() / "mug");
+    ImageSetWriter writer(root(), "mug", turn_under_light(), nlohmann::json::object(),
+                          {.sync_every_view = false});
+    for (const auto& pose : poses) writer.add(lit(pose[0], pose[1]), pose);
+    writer.finish();
+    const auto sets = open_image_sets(root());
+    LearningOptions with_windows = testing::small_learning();
+    with_windows.parts = true;
+    for (const LearningOptions& options : {testing::small_learning(), with_windows}) {
+      LearningReport report;
+      const auto model = std::make_shared<const Model>(learn(all_views(sets), options, &report));
+      EXPECT_TRUE(report.left_out.empty());
+      EXPECT_EQ(model->objects[0].views, poses.size());
+      EXPECT_EQ(report.evidence[0].left_out_errors[1].size(), poses.size()) << "each left out once";
+      Recognizer recognizer(model);
+      const auto outcomes = recognizer.recognize(lit(120.0, 10.0));
+      ASSERT_EQ(outcomes.size(), 1U);
+      ASSERT_TRUE(outcomes[0].best);
+      EXPECT_NEAR(outcomes[0].best->q[0], 120.0, 8.0);
+      EXPECT_NEAR(outcomes[0].best->q[1], 10.0, 12.0);
+    }
+  }
+}
+
 TEST_F(Learning, LearnsPoseAndLightTogether) {
-  // The second DOF is the side the light comes from: brightness rises or falls across the object.
-  const Workspace workspace({{"table", "deg", 0.0, 360.0, true}, {"light", "deg", -40.0, 40.0, false}});
-  const auto lit = [](double table, double light) {
-    cv::Mat picture = testing::scene_with(1, table);
-    for (int y = 0; y < picture.rows; ++y)
-      for (int x = 0; x < picture.cols; ++x) {
-        auto& pixel = picture.at<cv::Vec3b>(y, x);
-        if (pixel[0] + pixel[1] + pixel[2] < 90) continue;
-        for (int b = 0; b < 3; ++b)
-          pixel[b] = cv::saturate_cast<unsigned char>(pixel[b] * (0.6 + light * (x - 80) / 2400.0));
-      }
-    return picture;
-  };
+  const Workspace workspace = turn_under_light();
   ImageSetWriter writer(root(), "mug", workspace, nlohmann::json::object(), {.sync_every_view = false});
   for (int table = 0; table < 360; table += 20)
     for (int light = -40; light <= 40; light += 20) writer.add(lit(table, light), {1.0 * table, 1.0 * light});
