@@ -136,9 +136,8 @@ void PoseTable::check_options() const {
   for (const std::string& name : options_.ignore)
     if (std::find(csv_.header.begin(), csv_.header.end(), name) == csv_.header.end() || name == "file" ||
         name == "object")
-      throw std::invalid_argument("\"" + name +
-                                  "\" is to be ignored, but no other column than file and object of " +
-                                  file_.string() + " is named so");
+      throw std::invalid_argument("\"" + name + "\" is to be ignored, but " + file_.string() +
+                                  " has no such column beside file and object");
   for (const DofColumn& column : columns_) {
     if (!named(options_.periodic, column)) continue;
     if (named(options_.open, column))

@@ -107,7 +107,7 @@ class Importer {
   void import(const ImportObject& object) {
     if (import_finished(object, root_, import_.workspace, source_)) {
       for (std::size_t i = 0; i < object.views.size(); ++i) step_();
-      report_.sets.push_back({object.name, object.views.size(), true});
+      report_.sets.push_back({object.name, ImageSet::open(root_ / object.name).views().size(), true});
       return;
     }
     ImageSetWriter writer(root_, object.name, import_.workspace, source_, {report_.cropped, false});
