@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +17,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <pthread.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
@@ -23,6 +25,7 @@
 #include "config/config.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/printable.h"
 #include "daemon/api/event_publisher.h"
 #include "daemon/api/routes.h"
 #include "daemon/api/server.h"
@@ -55,6 +58,7 @@ class Signals {
     // Before any other thread exists, so that all of them inherit it.
     pthread_sigmask(SIG_BLOCK, &ending_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of the write
     std::signal(SIGHUP, SIG_IGN);
   }
   /// Waits until the service should end. Meanwhile feeds systemd's watchdog, but only while every worker
@@ -97,11 +101,27 @@ class ExitDeadline {
   std::jthread thread_;
 };
 
+/// The text of a log line (%*), made printable: names and messages from outside make no line of their own.
+class PrintableText : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
+              spdlog::memory_buf_t& line) override {
+    const std::string text = printable({message.payload.data(), message.payload.size()});
+    line.append(text.data(), text.data() + text.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableText>();
+  }
+};
+
 void start_log(const std::string& level) {
   auto log = spdlog::stderr_logger_mt("eigenposed");
   // journald stamps the time itself; a terminal and a file do not.
   const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
-  log->set_pattern(journal ? "level=%l %v" : "time=%Y-%m-%dT%H:%M:%S.%e level=%l %v");
+  auto line = std::make_unique<spdlog::pattern_formatter>();
+  line->add_flag<PrintableText>('*').set_pattern(journal ? "level=%l %*"
+                                                         : "time=%Y-%m-%dT%H:%M:%S.%e level=%l %*");
+  log->set_formatter(std::move(line));
   log->set_level(spdlog::level::from_str(level));
   log->flush_on(spdlog::level::info);
   spdlog::set_default_logger(std::move(log));
@@ -192,7 +212,7 @@ int main_with_words(int argc, char** argv) {
     if (!options.check_only) spdlog::info("event=stopped");
     return 0;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "eigenposed: %s\n", error.what());
+    std::fprintf(stderr, "eigenposed: %s\n", printable(error.what()).c_str());
     return 1;
   }
 }

@@ -1,17 +1,31 @@
 #pragma once
 
-/// What a command shows a person while it works.
+/// How a command shows something: progress and warnings on stderr, results on stdout.
 
 #include <chrono>
 #include <cstddef>
+#include <mutex>
 #include <string>
 
 #include "core/base/progress.h"
 
 namespace eigenpose::cli {
 
+/// Prepares the process for writing: a reader that has gone and a file that may not grow are errors of the
+/// write, no signals; and a standard stream that is closed is held by /dev/null, so that no file of ours gets
+/// its number and is printed into. To be called first.
+void prepare_output();
+
+/// Hands everything that was printed on stdout to the system. A command that prints for as long as it runs
+/// calls it after each result, main at the end of every command. @throws Error when something printed since
+/// the start was not written.
+void flush_output();
+
+/// One line on stderr, made printable: "eigenpose: TEXT". What was printed on stdout before comes first.
+void warn(const std::string& text);
+
 /// Progress on stderr: one line that rewrites itself on a terminal, a plain line every few seconds otherwise.
-/// One thread at a time.
+/// Thread-safe.
 class ConsoleProgress {
  public:
   /// @param quiet nothing is written at all.
@@ -28,8 +42,11 @@ class ConsoleProgress {
   void clear();
 
  private:
+  void clear_line();
+
   bool quiet_;
   bool terminal_;
+  std::mutex mutex_;  ///< guards what follows
   bool line_shown_ = false;
   std::string stage_;
   std::chrono::steady_clock::time_point stage_began_{};

@@ -10,6 +10,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/base/atomic_file.h"
+#include "core/base/printable.h"
 #include "core/learning/learning.h"
 #include "core/learning/training_archive.h"
 #include "core/model/model_file.h"
@@ -85,7 +87,7 @@ void print(const Model& model, const LearningReport& report, const std::string& 
               report.solver.solver.c_str(),
               energy_text(report.solver.energy, report.solver.energy_bound).c_str());
   print_resemblance(model);
-  std::printf("model: %s\n", file.c_str());
+  std::printf("model: %s\n", printable(file).c_str());
 }
 
 std::filesystem::path views_file(const std::string& model) {
@@ -143,8 +145,12 @@ int run_learn(LearnOptions options, const CLI::App& command, const std::stop_tok
         command.count("--components") > 0 ? static_cast<int>(options.learning.components) : 0;
     return learn_at_service(options.service, components, stop);
   }
+  if (options.sets.empty() && !options.learning.objects.empty())
+    throw ConfigError(
+        "--objects: it chooses from image sets, and none are given; --remove names objects that leave");
   if (options.to.empty()) options.to = options.update;
   if (options.to.empty()) throw Error("the model needs a name: add --to FILE");
+  { const AtomicFile writable(options.to); }  // said now, not when all is learned
   Lesson lesson = update ? next_lesson(options) : new_lesson(options);
   const auto folder = std::filesystem::path(options.to).parent_path();
   if (options.learning.strict) lesson.options.bad_views = BadViews::refuse;
@@ -153,6 +159,7 @@ int run_learn(LearnOptions options, const CLI::App& command, const std::stop_tok
   LearningReport report;
   const Model model = learn(lesson.sets, lesson.options, &report, progress.callback(), stop);
   save_model(model, options.to);
+  if (report.kept_views) report.kept_views->commit();
   progress.clear();
   print_left_out(lesson.left_out);
   print_left_out(report.left_out);

@@ -4,6 +4,9 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <functional>
+#include <new>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -15,6 +18,7 @@
 
 #include "core/base/error.h"
 #include "daemon/cli/commands.h"
+#include "daemon/cli/console.h"
 #include "daemon/cli/hardware_commands.h"
 #include "daemon/cli/service_commands.h"
 #include "daemon/manual/man_page.h"
@@ -94,22 +98,36 @@ class SignalWatch {
   std::thread watcher_;
 };
 
-/// The one place where exceptions become words.
+/// The one place where exceptions become one line on stderr.
 int complain(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
   } catch (const Interrupted& interrupted) {
-    std::fprintf(stderr, "eigenpose: %s\n", interrupted.what());
+    warn(interrupted.what());
     return exit_interrupted;
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "eigenpose: out of memory; fewer views, a smaller --size or --grey need less\n");
+    warn("out of memory; fewer views, a smaller --size or --grey need less");
+  } catch (const std::filesystem::filesystem_error& error) {
+    warn(error.path1().string() + ": " + error.code().message());
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "eigenpose: %s\n", error.what());
+    warn(error.what());
   }
   return exit_failed;
 }
 
+/// The exit code of `work`; also of its output, which is complete only when all of it was written.
+int finished(const std::function<int()>& work) {
+  try {
+    const int code = work();
+    flush_output();
+    return code;
+  } catch (...) {
+    return complain(std::current_exception());
+  }
+}
+
 int run(int argc, char** argv) {
+  prepare_output();
   SignalWatch signals;
   CommandLine line;
   line.stop = signals.token();
@@ -124,16 +142,11 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    std::fprintf(stderr, "eigenpose: %s; 'eigenpose --help' and 'eigenpose COMMAND --help' explain\n",
-                 error.what());
+    if (error.get_exit_code() == 0) return finished([&] { return app.exit(error); });  // --help, --version
+    warn(std::string(error.what()) + "; 'eigenpose --help' and 'eigenpose COMMAND --help' explain");
     return exit_usage;
   }
-  try {
-    return line.action();
-  } catch (...) {
-    return complain(std::current_exception());
-  }
+  return finished(line.action);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -10,10 +12,12 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/printable.h"
 #include "core/image/picture_file.h"
 #include "core/model/model_file.h"
 #include "core/recognition/recognizer.h"
 #include "daemon/cli/commands.h"
+#include "daemon/cli/console.h"
 #include "daemon/cli/outcome_json.h"
 #include "daemon/cli/recognizer_options.h"
 
@@ -22,7 +26,8 @@ namespace {
 
 constexpr const char* recognize_examples = R"(
 Every object in a picture gets one line: where it is, which object, its pose, and how sure that is. A picture given to a
-model learned from cropped views is taken whole.
+model learned from cropped views is taken whole. A picture that cannot be read is named on stderr, with --json also in
+its place in the list ("error"); the others are answered, and the exit code is 1.
 
 Examples:
   eigenpose recognize photo.png --model lab.model
@@ -74,30 +79,65 @@ void print(const Outcome& outcome, const Model& model) {
         outcome.verdict == Verdict::ambiguous && outcome.runner_up ? outcome.runner_up->object.c_str() : "");
 }
 
+/// Prints the answers, picture by picture.
+class Answers {
+ public:
+  Answers(const Model& model, bool as_json) : model_(model), as_json_(as_json) {}
+
+  void outcomes(const std::string& picture, std::span<const Outcome> outcomes) {
+    if (as_json_) {
+      nlohmann::json list = nlohmann::json::array();
+      for (const Outcome& outcome : outcomes) list.push_back(to_json(outcome, model_));
+      element({{"image", picture}, {"outcomes", list}});
+      return;
+    }
+    std::printf("%s%s\n", printable(picture).c_str(), outcomes.empty() ? ": nothing there" : "");
+    for (const Outcome& outcome : outcomes) print(outcome, model_);
+  }
+
+  void failure(const std::string& picture, const std::string& what) {
+    ++failed_;
+    if (as_json_) element({{"image", picture}, {"error", what}});
+    warn(what);
+  }
+
+  /// Ends the list. @return what the shell gets.
+  int end() {
+    if (as_json_) std::printf(count_ == 0 ? "[]\n" : "\n]\n");
+    return failed_ == 0 ? exit_done : exit_failed;
+  }
+
+ private:
+  void element(const nlohmann::json& value) {
+    // A name that is not UTF-8 gets U+FFFD where it is not: JSON knows nothing else.
+    std::printf("%s%s", count_++ == 0 ? "[\n" : ",\n",
+                value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  }
+
+  const Model& model_;
+  bool as_json_;
+  std::size_t count_ = 0;
+  std::size_t failed_ = 0;
+};
+
 int run_recognize(const RecognizeOptions& options, const std::stop_token& stop) {
   const auto model = std::make_shared<const Model>(load_model(options.model));
   Recognizer recognizer(model, options.recognizer);
-  nlohmann::json all = nlohmann::json::array();
+  Answers answers(*model, options.as_json);
   for (const std::string& name : options.images) {
-    if (stop.stop_requested()) throw Interrupted();
-    const cv::Mat image = load_picture(name);
-    std::span<const Outcome> outcomes;
+    if (stop.stop_requested()) {
+      (void)answers.end();
+      throw Interrupted();
+    }
     try {
-      outcomes = recognizer.recognize(image);
+      answers.outcomes(name, recognizer.recognize(load_picture(name)));
+    } catch (const FileError& wrong) {
+      answers.failure(name, wrong.what());
     } catch (const std::invalid_argument& wrong) {
-      throw FileError(name, wrong.what());
+      answers.failure(name, FileError(name, wrong.what()).what());
     }
-    if (options.as_json) {
-      nlohmann::json list = nlohmann::json::array();
-      for (const Outcome& outcome : outcomes) list.push_back(to_json(outcome, *model));
-      all.push_back({{"image", name}, {"outcomes", list}});
-      continue;
-    }
-    std::printf("%s%s\n", name.c_str(), outcomes.empty() ? ": nothing there" : "");
-    for (const Outcome& outcome : outcomes) print(outcome, *model);
   }
-  if (options.as_json) std::printf("%s\n", all.dump(2).c_str());
-  return exit_done;
+  return answers.end();
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 /// `eigenpose resample`: learned manifolds as tables.
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -8,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/base/error.h"
+#include "core/base/printable.h"
 #include "core/model/model_file.h"
 #include "core/model/resampled_file.h"
 #include "daemon/cli/commands.h"
@@ -40,6 +42,8 @@ std::vector<std::size_t> chosen_objects(const Model& model, const std::vector<st
     if (o == model.objects.size())
       throw ConfigError("--objects: the model has no \"" + name +
                         "\"; 'eigenpose inspect' lists its objects");
+    if (std::find(chosen.begin(), chosen.end(), o) != chosen.end())
+      throw ConfigError("--objects: \"" + name + "\" is named twice");
     chosen.push_back(o);
   }
   return chosen;
@@ -49,7 +53,7 @@ int run_resample(const ResampleOptions& options) {
   const Model model = load_model(options.model);
   const auto files =
       write_resampled(model, chosen_objects(model, options.objects), options.resampling, options.to);
-  for (const auto& file : files) std::printf("%s\n", file.c_str());
+  for (const auto& file : files) std::printf("%s\n", printable(file.string()).c_str());
   return exit_done;
 }
 

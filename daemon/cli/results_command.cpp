@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "daemon/cli/console.h"
 #include "daemon/cli/service_client.h"
 #include "daemon/cli/service_commands.h"
 
@@ -46,7 +47,7 @@ void print(const json& result) {
     for (std::size_t i = 0; i < result.at("outcomes").size(); ++i)
       line += (i > 0 ? "; " : "") + words(result.at("outcomes")[i]);
   std::printf("%s\n", line.c_str());
-  std::fflush(stdout);
+  flush_output();
 }
 
 int run_results(const ResultsOptions& options, const std::stop_token& stop) {
@@ -64,12 +65,12 @@ int run_results(const ResultsOptions& options, const std::stop_token& stop) {
       "/v1/results",
       [&](const ApiEvent& event) {
         if (event.name == "lost") {
-          std::fprintf(stderr, "eigenpose: too slow for the stream: %s\n", event.data.c_str());
+          warn("too slow for the stream: " + event.data);
           return true;
         }
         if (options.service.json) {
           std::printf("%s\n", event.data.c_str());
-          std::fflush(stdout);
+          flush_output();
         } else {
           print(json::parse(event.data));
         }
@@ -86,9 +87,10 @@ int run_results(const ResultsOptions& options, const std::stop_token& stop) {
 void add_results_command(CLI::App& app, CommandLine& line) {
   const auto options = std::make_shared<ResultsOptions>();
   CLI::App* command = app.add_subcommand("results", "What the service sees on the table");
-  command->add_flag("--follow", options->follow, "Go on: print each new result as it comes");
+  auto* follow = command->add_flag("--follow", options->follow, "Go on: print each new result as it comes");
   command->add_option("--count", options->count, "With --follow: end after so many results")
-      ->check(CLI::Range(1, 1'000'000'000));
+      ->check(CLI::Range(1, 1'000'000'000))
+      ->needs(follow);
   add_service_options(*command, options->service);
   command->footer("Examples:\n  eigenpose results\n  eigenpose results --follow --json | jq .outcomes");
   command->callback(

@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 #include <random>
 #include <string>
@@ -19,6 +18,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/angle.h"
+#include "core/base/atomic_file.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "daemon/api/client/api_client.h"
@@ -283,8 +283,7 @@ void save_picture(ApiClient& api, const std::string& folder, unsigned number) {
   char name[32];
   std::snprintf(name, sizeof name, "/%03u.jpg", number);
   const std::string jpeg = api.get_bytes("/v1/frame.jpg");
-  std::ofstream(folder + name, std::ios::binary)
-      .write(jpeg.data(), static_cast<std::streamsize>(jpeg.size()));
+  write_file_atomically(folder + name, jpeg);
 }
 
 bool report(Tally& tally, const std::vector<std::string>& symmetric_learned) {

@@ -33,6 +33,7 @@ namespace {
 
 using test::Program;
 using testing::HasSubstr;
+using testing::Not;
 
 class DaemonProcess : public testing::Test {
  protected:
@@ -79,7 +80,7 @@ TEST_F(DaemonProcess, StopsCleanlyInTheMiddleOfAnAcquisition) {
   EXPECT_EQ(daemon.wait(), 0) << log();
   EXPECT_TRUE(std::filesystem::is_empty(run_)) << "sockets are gone";
   for (const auto& entry : std::filesystem::recursive_directory_iterator(state_))
-    EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path() << " is half-written";
+    EXPECT_EQ(entry.path().string().find("-part-"), std::string::npos) << entry.path() << " is half-written";
   EXPECT_THAT(log(), HasSubstr("event=job_cancelled"));
   EXPECT_THAT(log(), HasSubstr("event=stopped"));
 }
@@ -203,6 +204,19 @@ TEST_F(DaemonProcess, ReplacesTheSocketsOfOneThatWasKilled) {
   ASSERT_TRUE(std::filesystem::exists(run_ / "control.sock"));
   Program next(EIGENPOSED, arguments(), log_);
   EXPECT_EQ(status_once_ready().at("program"), "eigenposed");
+}
+
+TEST_F(DaemonProcess, NothingFromOutsideMakesALogLineOfItsOwn) {
+  const std::filesystem::path file = folder_.path() / "a\nlevel=error event=forged \x1b[2J.toml";
+  std::filesystem::copy_file(std::string(EIGENPOSE_SOURCE_DIR) + "/config/rigs/simulated.toml", file);
+  Program daemon({"--config", file.string(), "--runtime-dir", run_.string(), "--state-dir", state_.string()},
+                 log_);
+  status_once_ready();
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0) << log();
+  EXPECT_THAT(log(), HasSubstr("/a\\nlevel=error event=forged \\x1b[2J.toml"));
+  EXPECT_THAT(log(), Not(HasSubstr("\nlevel=error event=forged")));
+  EXPECT_THAT(log(), Not(HasSubstr("\x1b")));
 }
 
 TEST_F(DaemonProcess, AnUnknownKeyStopsItBeforeAnythingIsOpened) {
