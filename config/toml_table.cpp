@@ -3,48 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <numeric>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
 #include "core/base/error.h"
+#include "core/base/similar_word.h"
 
 namespace eigenpose {
 namespace {
-
-/// Levenshtein's distance: how many letters to change, add or drop.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
-  }
-  return row.back();
-}
-
-/// The allowed key that was probably meant, or nothing. A wrong unit (settle_s for settle_ms) counts as near.
-std::optional<std::string> nearest(std::string_view key, const std::vector<std::string>& allowed) {
-  const auto stem = [](std::string_view text) { return text.substr(0, text.rfind('_')); };
-  std::optional<std::string> best;
-  std::size_t best_distance = 3;  // more than two letters off is another word
-  for (const std::string& candidate : allowed) {
-    const bool same_stem = key.find('_') != std::string_view::npos && stem(key) == stem(candidate);
-    const std::size_t distance = same_stem ? 1 : edit_distance(key, candidate);
-    if (distance < best_distance) {
-      best_distance = distance;
-      best = candidate;
-    }
-  }
-  return best;
-}
 
 [[noreturn]] void fail_at(const std::string& file, const toml::source_region& where,
                           const std::string& what) {
@@ -288,7 +256,7 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) const {
 void TomlTable::finish() const {
   for (const auto& [key, value] : *impl_->table) {
     if (std::find(impl_->known.begin(), impl_->known.end(), key.str()) != impl_->known.end()) continue;
-    const std::optional<std::string> meant = nearest(key.str(), impl_->known);
+    const std::optional<std::string> meant = similar_word(key.str(), impl_->known);
     std::string what = fmt::format("unknown key \"{}\"", key.str());
     if (!impl_->name.empty()) what += " in " + impl_->name;
     if (meant) what += fmt::format(", did you mean \"{}\"?", *meant);

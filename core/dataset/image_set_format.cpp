@@ -11,6 +11,7 @@
 #include "core/base/input_file.h"
 #include "core/base/json.h"
 #include "core/base/object_name.h"
+#include "core/dataset/workspace_json.h"
 
 namespace eigenpose {
 namespace {
@@ -42,17 +43,6 @@ Workspace parse_workspace(const json& list) {
          json_number(json_member(item, "lower"), "lower"), json_number(json_member(item, "upper"), "upper"),
          json_flag(json_member(item, "periodic"), "periodic")});
   return Workspace(std::move(dofs));
-}
-
-json describe(const Workspace& workspace) {
-  json list = json::array();
-  for (const Dof& dof : workspace.dofs())
-    list.push_back({{"name", dof.name},
-                    {"unit", dof.unit},
-                    {"lower", dof.lower},
-                    {"upper", dof.upper},
-                    {"periodic", dof.periodic}});
-  return list;
 }
 
 /// A file name inside the folder, no way out of it.
@@ -137,7 +127,7 @@ std::string json_line(const nlohmann::json& value, int indent) {
 
 std::string set_index_text(const SetIndex& index, const nlohmann::json& source) {
   const json all = {{"format", format_name},    {"version", format_version},
-                    {"object", index.object},   {"workspace", describe(index.workspace)},
+                    {"object", index.object},   {"workspace", workspace_json(index.workspace)},
                     {"cropped", index.cropped}, {"complete", index.complete},
                     {"source", source}};
   return json_line(all, 2);

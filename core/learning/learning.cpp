@@ -2,26 +2,17 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 #include <optional>
 #include <set>
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/base/utc_text.h"
 #include "core/learning/object_eigenspaces.h"
 #include "core/learning/training_archive.h"
 
 namespace eigenpose {
 namespace {
-
-std::string utc_now() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm parts{};
-  gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
-}
 
 /// Measures one stage after the other.
 class Stopwatch {
@@ -208,7 +199,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   check_names(sets);
   options = settled_options(sets, std::move(options));
   const Run run{options, result, progress, stop};
-  const std::string created = utc_now();
+  const std::string created = utc_text(std::chrono::system_clock::now(), UtcDigits::seconds);
 
   const TrainingViews views(sets, store_options(options), progress, stop);
   result.views = views.count();
