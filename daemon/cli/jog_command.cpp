@@ -38,7 +38,8 @@ void add_jog_command(CLI::App& app, CommandLine& line) {
       const SteadyClock clock;
       HandControl hands(options->rig.read(), clock);
       if (options->home_first) hands.home(options->axis, line.stop);
-      const double arrived = hands.jog(options->axis, options->position, options->relative, line.stop);
+      const double arrived = options->relative ? hands.jog_by(options->axis, options->position, line.stop)
+                                               : hands.jog_to(options->axis, options->position, line.stop);
       std::printf("%s: %.3f %s\n", options->axis.c_str(), arrived, hands.unit_of(options->axis).c_str());
       return static_cast<int>(exit_done);
     };

@@ -46,8 +46,8 @@ void check_machine(const Machine& machine, const Config& config, const Inventory
 /// The same of all that is plugged in, where there is no configuration to say what is needed.
 void check_found(const Machine& machine, const Inventory& inventory, const Report& report);
 
-/// Opens every configured device, one after the other, and listens to what it says: the camera takes
-/// pictures, each drive tells its state, each lamp is told to be dark. Moves nothing. Stops between two
+/// Opens every configured device, one after the other, and reads what it reports: the camera takes
+/// pictures, each drive reports its state, each lamp is set dark. Moves nothing. Stops between two
 /// devices on request (throws Interrupted).
 void check_devices(const Devices& devices, const Clock& clock, const std::stop_token& stop,
                    const Report& report);

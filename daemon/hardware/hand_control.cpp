@@ -16,9 +16,10 @@ using std::chrono::seconds;
 
 Devices devices_of(const Config& config, const Clock& clock) {
   if (is_service_running(config)) {
-    throw Error(fmt::format(
-        "eigenposed is running and holds the devices ({} answers): stop it first: systemctl stop eigenposed",
-        config.results_socket().string()));
+    throw Error(
+        fmt::format("eigenposed is running and holds the devices ({} answers); stop it first with 'systemctl "
+                    "stop eigenposed'",
+                    config.results_socket().string()));
   }
   return make_devices(config, clock);
 }
@@ -28,6 +29,13 @@ std::string list_of(const Items& items, const NameOf& name_of) {
   std::string names;
   for (const auto& item : items) names += (names.empty() ? "" : ", ") + name_of(item);
   return names.empty() ? "none" : names;
+}
+
+/// @throws std::out_of_range, also for what is no number.
+void refuse_outside(const std::string& axis, const Dof& dof, double target) {
+  if (!(target >= dof.lower && target <= dof.upper))
+    throw std::out_of_range(fmt::format("{}: {:g} {} is outside {:g} to {:g}; nothing was moved", axis,
+                                        target, dof.unit, dof.lower, dof.upper));
 }
 
 }  // namespace
@@ -72,28 +80,25 @@ void HandControl::home(const std::string& axis, std::stop_token stop) {
   opened.axis->home(clock_.now() + opened.setup->options.move_timeout, std::move(stop));
 }
 
-double HandControl::jog(const std::string& axis, double position, bool relative, std::stop_token stop) {
+double HandControl::jog_to(const std::string& axis, double position, std::stop_token stop) {
+  OpenAxis& opened = open(axis);
+  refuse_outside(axis, opened.setup->options.dof, position);
+  return opened.axis->move_to(position, clock_.now() + opened.setup->options.move_timeout, std::move(stop));
+}
+
+double HandControl::jog_by(const std::string& axis, double distance, std::stop_token stop) {
   OpenAxis& opened = open(axis);
   const Dof& dof = opened.setup->options.dof;
   const TimePoint deadline = clock_.now() + opened.setup->options.move_timeout;
-  const auto refuse_outside = [&](double target) {
-    if (!(target >= dof.lower && target <= dof.upper))
-      throw std::out_of_range(fmt::format("{}: {:g} {} is outside {:g} to {:g}; nothing was moved", axis,
-                                          target, dof.unit, dof.lower, dof.upper));
-  };
-  if (!relative) {
-    refuse_outside(position);
-    return opened.axis->move_to(position, deadline, std::move(stop));
-  }
   const AxisState state = opened.axis->state(clock_.now() + seconds(3));
-  if (state.homed && !dof.periodic) refuse_outside(state.position + position);
-  if (!state.homed && std::abs(position) > longest_unhomed_jog(dof))
+  if (state.homed && !dof.periodic) refuse_outside(axis, dof, state.position + distance);
+  if (!state.homed && std::abs(distance) > longest_unhomed_jog(dof))
     throw DeviceError(
         axis, "jog",
         fmt::format("it has not been homed, so its limits are not known: 'eigenpose home {}' first, or "
                     "jog it by {:g} {} at most to free it",
                     axis, longest_unhomed_jog(dof), dof.unit));
-  return opened.axis->jog(position, deadline, std::move(stop));
+  return opened.axis->jog(distance, deadline, std::move(stop));
 }
 
 void HandControl::light(const std::string& lamp, double level) {

@@ -28,14 +28,17 @@ class HandControl {
   /// Where the axis stands. @throws ConfigError for a name that is not configured, DeviceError and its kinds.
   AxisState state(const std::string& axis);
 
-  /// Homes. Motion ends with Interrupted on `stop`; then, as after any failure, the drive was told to stop.
+  /// Homes. Motion ends with Interrupted on `stop`; then, as after any failure, the drive was commanded to
+  /// stop.
   void home(const std::string& axis, std::stop_token stop);
 
-  /// Moves to `position`, or by it from where the axis stands. Limits are those of the configuration; an axis
-  /// that is not homed does not know them, and is moved a little at most.
+  /// Moves to `position`, in the axis's unit. Limits are those of the configuration.
   /// @return the position read back. @throws std::out_of_range before anything moves; DeviceError (not homed,
   /// …).
-  double jog(const std::string& axis, double position, bool relative, std::stop_token stop);
+  double jog_to(const std::string& axis, double position, std::stop_token stop);
+  /// The same by `distance` from where the axis stands. An axis that is not homed does not know its limits,
+  /// and moves by `longest_unhomed_jog` at most.
+  double jog_by(const std::string& axis, double distance, std::stop_token stop);
 
   /// Lights a lamp; it goes dark with this object. @param level 0 … 1. @throws std::out_of_range;
   /// DeviceError.

@@ -87,20 +87,20 @@ class HandControlTest : public testing::Test {
 
 TEST_F(HandControlTest, JogsToAPositionAndByADistance) {
   HandControl control = hands();
-  EXPECT_DOUBLE_EQ(control.jog("elevation", 20.0, false, {}), 20.0);
-  EXPECT_DOUBLE_EQ(control.jog("elevation", -5.0, true, {}), 15.0);
+  EXPECT_DOUBLE_EQ(control.jog_to("elevation", 20.0, {}), 20.0);
+  EXPECT_DOUBLE_EQ(control.jog_by("elevation", -5.0, {}), 15.0);
   EXPECT_EQ(control.unit_of("elevation"), "deg");
 }
 
 TEST_F(HandControlTest, JogsAPeriodicAxisThroughItsSeam) {
-  EXPECT_DOUBLE_EQ(hands().jog("table", 30.0, true, {}), 20.0);
+  EXPECT_DOUBLE_EQ(hands().jog_by("table", 30.0, {}), 20.0);
 }
 
 TEST_F(HandControlTest, RefusesATargetBeyondTheLimitsAndMovesNothing) {
   HandControl control = hands();
-  EXPECT_THROW(control.jog("elevation", 81.0, false, {}), std::out_of_range);
-  EXPECT_THROW(control.jog("elevation", 20.0, true, {}), std::out_of_range);
-  EXPECT_THROW(control.jog("elevation", std::nan(""), false, {}), std::out_of_range);
+  EXPECT_THROW(control.jog_to("elevation", 81.0, {}), std::out_of_range);
+  EXPECT_THROW(control.jog_by("elevation", 20.0, {}), std::out_of_range);
+  EXPECT_THROW(control.jog_to("elevation", std::nan(""), {}), std::out_of_range);
   EXPECT_EQ(moves_, 0);
 }
 
@@ -108,15 +108,15 @@ TEST_F(HandControlTest, WantsAnAxisHomedBeforeItJogsByADistance) {
   elevation_.homed = false;
   HandControl control = hands();
   try {
-    control.jog("elevation", 5.0, true, {});
+    control.jog_by("elevation", 5.0, {});
     FAIL();
   } catch (const DeviceError& error) {
     EXPECT_THAT(error.what(), HasSubstr("eigenpose home elevation"));
     EXPECT_THAT(error.what(), HasSubstr("2.5 deg at most"));
   }
-  EXPECT_THROW(control.jog("elevation", 1.0, true, {}), DeviceError) << "this driver only knows positions";
+  EXPECT_THROW(control.jog_by("elevation", 1.0, {}), DeviceError) << "this driver only knows positions";
   control.home("elevation", {});
-  EXPECT_DOUBLE_EQ(control.jog("elevation", 1.0, true, {}), 1.0);
+  EXPECT_DOUBLE_EQ(control.jog_by("elevation", 1.0, {}), 1.0);
 }
 
 TEST(HandControlInTheSimulatedLab, TurnsAnArmOnAnAptStageByPositionAndByDistance) {
@@ -139,17 +139,17 @@ upper = 90.0
   fs::create_directories(config.daemon.runtime_dir);
   const SteadyClock clock;
   HandControl control(config, clock);
-  EXPECT_THROW(control.jog("arm", 10.0, false, {}), DeviceError) << "not homed";
+  EXPECT_THROW(control.jog_to("arm", 10.0, {}), DeviceError) << "not homed";
   control.home("arm", {});
-  EXPECT_NEAR(control.jog("arm", 30.0, false, {}), 30.0, 0.05);
-  EXPECT_NEAR(control.jog("arm", -45.0, true, {}), -15.0, 0.05);
-  EXPECT_THROW(control.jog("arm", -80.0, true, {}), std::out_of_range);
+  EXPECT_NEAR(control.jog_to("arm", 30.0, {}), 30.0, 0.05);
+  EXPECT_NEAR(control.jog_by("arm", -45.0, {}), -15.0, 0.05);
+  EXPECT_THROW(control.jog_by("arm", -80.0, {}), std::out_of_range);
   EXPECT_NEAR(control.state("arm").position, -15.0, 0.05);
 }
 
 TEST_F(HandControlTest, NamesTheAxesThereAreWhenAskedForAnother) {
   try {
-    hands().jog("tabel", 1.0, false, {});
+    hands().jog_to("tabel", 1.0, {});
     FAIL();
   } catch (const ConfigError& error) {
     EXPECT_THAT(error.what(), HasSubstr("table, elevation"));
