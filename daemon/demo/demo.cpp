@@ -234,7 +234,7 @@ std::string degree_text(const char* format, double value) {
 
 /// Pose and error of a known object, as two columns; counts them.
 std::string judge_pose(const json& outcome, const Placement& placement, const json& objects, Tally& tally) {
-  if (!is_observable(objects, placement.object)) {
+  if (!is_observable(objects, placement.object) || outcome.at("q").at(0).is_null()) {
     auto& names = tally.without_pose;
     if (std::find(names.begin(), names.end(), placement.object) == names.end())
       names.push_back(placement.object);
