@@ -59,8 +59,7 @@ ServiceOptions service_options(const Config& config) {
 
 ServerOptions server_options(const ApiOptions& api) {
   ServerOptions options;
-  options.max_connections = api.max_connections;
-  options.max_body = static_cast<std::size_t>(api.max_body_kib) * 1024;
+  options.limits.max_body = static_cast<std::size_t>(api.max_body_kib) * 1024;
   options.request_timeout = api.request_timeout;
   return options;
 }

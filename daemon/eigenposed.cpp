@@ -26,6 +26,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/printable.h"
+#include "daemon/api/descriptor_budget.h"
 #include "daemon/api/event_publisher.h"
 #include "daemon/api/routes.h"
 #include "daemon/api/server.h"
@@ -150,6 +151,9 @@ void run(const Options& options) {
   const Signals signals;
   start_log(config.daemon.log_level);
   spdlog::info("event=starting version={} config={}", EIGENPOSE_VERSION, config.file.string());
+  const DescriptorBudget budget = share_descriptors(raise_descriptor_limit(), config.api.max_connections);
+  spdlog::info("event=descriptors limit={} commanders={} readers={}", budget.limit, budget.commanders,
+               budget.readers);
   make_folder(config.daemon.runtime_dir, "runtime_dir");
   make_folder(config.daemon.state_dir, "state_dir");
   // A second daemon is refused here, before any device is opened.
@@ -162,11 +166,13 @@ void run(const Options& options) {
   EventPublisher publisher(static_cast<std::size_t>(config.api.event_buffer));
   Devices devices = make_devices(config, clock);
   Service service(work, {devices.camera, devices.axes, devices.lamps}, publisher, heartbeat, clock);
-  Server server(server_options(config.api), make_handler({service, publisher.results(), devices.simulation}),
-                heartbeat);
+  Heartbeat::Pulse pulse = heartbeat.join("server", std::chrono::seconds(15));
+  Server server(server_options(config.api),
+                make_application({service, publisher.results(), devices.simulation}),
+                [&pulse] { pulse.beat(); });
   const EventLog::Subscription wake_streams = publisher.results()->subscribe([&server] { server.notify(); });
-  server.listen(results, Access::read);
-  server.listen(control, Access::control);
+  server.listen(results, Access::read, budget.readers);
+  server.listen(control, Access::control, budget.commanders);
   server.start();
   spdlog::info("event=ready results={} control={}", results.path().string(), control.path().string());
   ::sd_notify(0, "READY=1");
@@ -196,9 +202,8 @@ int main_with_words(int argc, char** argv) {
   app.add_flag("--check-config", options.check_only,
                "Only say whether the configuration is good; open nothing");
   app.footer(
-      "Exit code: 0 stopped on SIGTERM or SIGINT, 1 could not start (one line on stderr says why), 2 line "
-      "not "
-      "understood.");
+      "Exit code: 0 stopped on SIGTERM or SIGINT, 1 could not start (one line on stderr says why), 2 usage "
+      "error.");
   add_man_flag(app, 8, "eigenpose(1)");
   try {
     app.parse(argc, argv);

@@ -1,6 +1,8 @@
 #include "daemon/api/errors.h"
 
-#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include "core/base/printable.h"
 
 namespace eigenpose {
 
@@ -24,17 +26,18 @@ int http_status(Fault fault) {
   return 500;
 }
 
-Response error_response(int status, const std::string& error, const std::string& hint) {
-  const nlohmann::json body = {{"error", error}, {"hint", hint}};
-  return {status,
-          "application/json",
-          body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
-          {}};
-}
-
 Response error_response(const std::exception_ptr& exception) {
-  const Failure failure = failure_of(exception);
-  return error_response(http_status(failure.fault), failure.what, failure.hint);
+  try {
+    std::rethrow_exception(exception);
+  } catch (const UnsupportedMediaType& error) {
+    return error_response(415, error.what(), error.hint());
+  } catch (...) {
+    const Failure failure = failure_of(exception);
+    if (failure.fault != Fault::internal)
+      return error_response(http_status(failure.fault), failure.what, failure.hint);
+    spdlog::error("event=request_failed error=\"{}\"", printable(failure.what));
+    return error_response(500, "eigenposed failed to answer", "its log says why; please report it");
+  }
 }
 
 }  // namespace eigenpose

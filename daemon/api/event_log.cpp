@@ -1,19 +1,32 @@
 #include "daemon/api/event_log.h"
 
 #include <algorithm>
+#include <random>
 #include <utility>
 
+#include <fmt/format.h>
+
 namespace eigenpose {
+namespace {
 
-EventLog::EventLog(std::size_t capacity) : capacity_(std::max<std::size_t>(1, capacity)) {}
+std::string new_run() {
+  std::random_device random;
+  return fmt::format("{:08x}", static_cast<std::uint32_t>(random()));
+}
 
-std::uint64_t EventLog::publish(const std::function<std::string(std::uint64_t)>& make) {
+}  // namespace
+
+EventLog::EventLog(std::size_t capacity) : capacity_(std::max<std::size_t>(1, capacity)), run_(new_run()) {}
+
+std::uint64_t EventLog::publish(std::string_view name,
+                                const std::function<std::string(std::uint64_t)>& make) {
   std::uint64_t sequence = 0;
   {
     const std::lock_guard lock(mutex_);
     auto data = std::make_shared<const std::string>(make(last_ + 1));
     sequence = ++last_;
-    kept_.push_back(std::move(data));
+    kept_.push_back({sequence, name, std::move(data), 0});
+    latest_[name] = kept_.back();
     if (kept_.size() > capacity_) kept_.pop_front();
   }
   const std::lock_guard lock(listener_mutex_);
@@ -27,13 +40,16 @@ std::optional<EventLog::Event> EventLog::after(std::uint64_t sequence) const {
   if (sequence == last_) return std::nullopt;
   const std::uint64_t oldest = last_ - kept_.size() + 1;
   const std::uint64_t next = std::max(sequence + 1, oldest);
-  return Event{next, kept_[next - oldest], next - sequence - 1};
+  Event event = kept_[next - oldest];
+  event.lost = next - sequence - 1;
+  return event;
 }
 
-std::optional<EventLog::Event> EventLog::latest() const {
+std::optional<EventLog::Event> EventLog::latest(std::string_view name) const {
   const std::lock_guard lock(mutex_);
-  if (kept_.empty()) return std::nullopt;
-  return Event{last_, kept_.back(), 0};
+  const auto found = latest_.find(name);
+  if (found == latest_.end()) return std::nullopt;
+  return found->second;
 }
 
 std::uint64_t EventLog::last_sequence() const {

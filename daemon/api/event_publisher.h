@@ -18,7 +18,7 @@ class EventPublisher final : public EventSink {
 
   void publish(const Event& event) noexcept override;
 
-  /// What was seen; never null.
+  /// What was seen, and when the camera was lost and found; never null.
   [[nodiscard]] const std::shared_ptr<EventLog>& results() const { return results_; }
 
  private:

@@ -1,7 +1,12 @@
 #include "daemon/api/json.h"
 
-#include <fmt/chrono.h>
+#include <chrono>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include "core/base/utc_text.h"
+#include "core/dataset/workspace_json.h"
 
 namespace eigenpose {
 namespace {
@@ -18,23 +23,6 @@ json or_null(const std::string& text) {
 }
 
 }  // namespace
-
-std::string iso_time(std::chrono::system_clock::time_point time) {
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch()).count();
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(ms / 1000)),
-                     ms % 1000);
-}
-
-json to_json(const Workspace& workspace) {
-  json dofs = json::array();
-  for (const Dof& dof : workspace.dofs())
-    dofs.push_back({{"name", dof.name},
-                    {"unit", dof.unit},
-                    {"lower", dof.lower},
-                    {"upper", dof.upper},
-                    {"periodic", dof.periodic}});
-  return dofs;
-}
 
 json to_json(const CameraStatus& camera) {
   if (!camera.configured) return nullptr;
@@ -115,8 +103,8 @@ json to_json(const JobStatus& job) {
           {"error", or_null(failure.what)},
           {"hint", or_null(failure.hint)},
           {"result", to_json(job.result)},
-          {"started", iso_time(job.started)},
-          {"ended", job.ended ? json(iso_time(*job.ended)) : json(nullptr)}};
+          {"started", utc_text(job.started, UtcDigits::milliseconds)},
+          {"ended", job.ended ? json(utc_text(*job.ended, UtcDigits::milliseconds)) : json(nullptr)}};
 }
 
 json status_json(const ApiSources& sources) {
@@ -152,9 +140,9 @@ json status_json(const ApiSources& sources) {
                   {"modbus_endpoint", fmt::format("tcp://127.0.0.1:{}", sim->modbus_port)}};
   return {{"program", "eigenposed"},
           {"version", EIGENPOSE_VERSION},
-          {"started", iso_time(service.started())},
+          {"started", utc_text(service.started(), UtcDigits::milliseconds)},
           {"state", service_state_name(activity.state)},
-          {"since", iso_time(activity.since)},
+          {"since", utc_text(activity.since, UtcDigits::milliseconds)},
           {"camera", to_json(service.camera().status())},
           {"axes", std::move(axes)},
           {"lamps", std::move(lamps)},
@@ -165,6 +153,7 @@ json status_json(const ApiSources& sources) {
            {{"frames", watched.frames},
             {"recognitions", watched.recognitions},
             {"error", or_null(watched.error)}}},
+          {"run", sources.results->run()},
           {"last_result", sources.results->last_sequence()},
           {"jobs", std::move(running)},
           {"sim", std::move(simulation)}};
@@ -185,7 +174,7 @@ json objects_json(const Service& service) {
       entry["learned"] = {{"views", learned.views},
                           {"rejection_distance", model->rejection_distance(*object.learned_as)},
                           {"pose_observable", learned.pose_observable},
-                          {"workspace", to_json(learned.workspace)}};
+                          {"workspace", workspace_json(learned.workspace)}};
     }
     objects.push_back(std::move(entry));
   }

@@ -2,12 +2,8 @@
 
 /// The API's JSON: one function a thing. Numbers carry their unit in the key; keys are stable.
 
-#include <chrono>
-#include <string>
-
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/base/workspace.h"
 #include "daemon/api/routes.h"
 #include "daemon/rig/frame_hub.h"
 #include "daemon/rig/rig.h"
@@ -16,10 +12,6 @@
 
 namespace eigenpose {
 
-/// "2026-11-22T02:03:04.567Z"
-std::string iso_time(std::chrono::system_clock::time_point time);
-
-nlohmann::json to_json(const Workspace& workspace);
 nlohmann::json to_json(const CameraStatus& camera);
 nlohmann::json to_json(const AxisStatus& axis);
 nlohmann::json to_json(const JobStatus& job);

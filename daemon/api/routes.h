@@ -19,7 +19,7 @@ struct ApiSources {
   std::optional<SimulationInfo> simulation;  ///< none: real devices
 };
 
-/// Answers requests. The service must outlive the handler.
-Handler make_handler(ApiSources sources);
+/// Answers requests. What the sources refer to must outlive the application.
+Application make_application(const ApiSources& sources);
 
 }  // namespace eigenpose

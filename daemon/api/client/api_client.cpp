@@ -83,7 +83,7 @@ class Connection {
   [[noreturn]] void fail(const error_code& error) const {
     if (error == boost::system::errc::timed_out)
       throw Error(socket_.string() + ": no answer within " + std::to_string(timeout_.count()) +
-                  " ms: the log of eigenposed may say why");
+                  " ms; the log of eigenposed may say why");
     throw Error(socket_.string() + ": the connection broke: " + error.message());
   }
 
@@ -111,7 +111,7 @@ std::string text_of(const json& object, const char* key) {
 }  // namespace
 
 ApiError::ApiError(int status, const std::string& error, const std::string& hint)
-    : Error(hint.empty() ? error : error + ": " + hint), status_(status) {}
+    : Error(hint.empty() ? error : error + "; " + hint), status_(status) {}
 
 ApiClient::ApiClient(std::filesystem::path socket, std::chrono::milliseconds timeout)
     : socket_(std::move(socket)), timeout_(timeout) {}
@@ -148,7 +148,7 @@ json ApiClient::ask_json(std::string_view method, std::string_view target, const
   const Reply reply = ask(method, target, body);
   json answer = json::parse(reply.body, nullptr, false);
   if (answer.is_discarded())
-    throw Error(socket_.string() + ": the answer is not JSON: is this eigenposed's socket?");
+    throw Error(socket_.string() + ": the answer is not JSON; give the path of eigenposed's socket");
   return answer;
 }
 

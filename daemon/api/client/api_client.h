@@ -17,7 +17,7 @@
 
 namespace eigenpose {
 
-/// The service said no. The text is "error: hint".
+/// The service has refused. The text is "error; hint".
 class ApiError : public Error {
  public:
   ApiError(int status, const std::string& error, const std::string& hint);
@@ -31,6 +31,7 @@ class ApiError : public Error {
 struct ApiEvent {
   std::string name;      ///< "result", "lost"
   std::uint64_t id = 0;  ///< its sequence number; that of the last result for "lost"
+  std::string run;       ///< of the service, within which the number counts
   std::string data;      ///< JSON
 };
 
@@ -72,7 +73,7 @@ class ApiClient {
   std::chrono::milliseconds timeout_;
 };
 
-/// Takes a stream of server-sent events apart, fed in pieces of any size.
+/// Splits a stream into server-sent events, fed in pieces of any size.
 class EventParser {
  public:
   /// @param handle is called for each whole event. @return false once it returned false.

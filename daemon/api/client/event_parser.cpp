@@ -33,7 +33,13 @@ bool EventParser::end_line(const std::function<bool(const ApiEvent&)>& handle) {
   std::string_view value = colon == std::string_view::npos ? std::string_view() : line.substr(colon + 1);
   if (value.starts_with(' ')) value.remove_prefix(1);
   if (field == "event") event_.name = value;
-  if (field == "id") std::from_chars(value.data(), value.data() + value.size(), event_.id);
+  if (field == "id") {
+    // "3f29ab01-12": the run and the number in it.
+    const std::size_t mark = value.rfind('-');
+    event_.run = mark == std::string_view::npos ? "" : value.substr(0, mark);
+    if (mark != std::string_view::npos) value.remove_prefix(mark + 1);
+    std::from_chars(value.data(), value.data() + value.size(), event_.id);
+  }
   if (field == "data") {
     if (has_data_) event_.data += '\n';
     event_.data += value;

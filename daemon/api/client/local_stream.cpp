@@ -36,9 +36,10 @@ LocalStream::LocalStream(const std::filesystem::path& socket) {
   if (socket_ >= 0) ::close(socket_);
   if (cause == EACCES)
     throw FileError(
-        socket, "you may not use this socket: join the group that owns it, or use results.sock for reading");
+        socket,
+        "this user may not use this socket; join the group that owns it, or use results.sock for reading");
   throw FileError(socket, std::string("no eigenposed answers there (") + std::strerror(cause) +
-                              "): start it, or name its socket with --socket");
+                              "); start it, or give the path of its socket");
 }
 
 LocalStream::~LocalStream() {

@@ -1,8 +1,6 @@
 #include "daemon/api/event_log.h"
 
 #include <string>
-#include <utility>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -10,14 +8,14 @@ namespace eigenpose {
 namespace {
 
 std::uint64_t publish(EventLog& log) {
-  return log.publish([](std::uint64_t sequence) { return std::to_string(sequence); });
+  return log.publish("result", [](std::uint64_t sequence) { return std::to_string(sequence); });
 }
 
 TEST(EventLog, NumbersEventsFromOneAndTellsTheNumberToTheirMaker) {
   EventLog log(4);
   EXPECT_EQ(publish(log), 1U);
   EXPECT_EQ(publish(log), 2U);
-  EXPECT_EQ(*log.latest()->data, "2");
+  EXPECT_EQ(*log.latest("result")->data, "2");
 }
 
 TEST(EventLog, AReaderThatKeepsUpGetsEveryEventOnce) {
@@ -51,36 +49,43 @@ TEST(EventLog, ANumberFromAFormerRunBeginsAnew) {
   EXPECT_EQ(log.after(1000)->sequence, 1U);
 }
 
-TEST(EventLog, CallsEveryListenerAfterEachEvent) {
+TEST(EventLog, CallsEachListenerAfterEachEventWhileItIsSubscribed) {
   EventLog log(3);
-  std::vector<std::uint64_t> first, second;
-  const auto one = log.subscribe([&] { first.push_back(log.last_sequence()); });
-  const auto two = log.subscribe([&] { second.push_back(log.last_sequence()); });
+  int first = 0;
+  int second = 0;
+  auto kept = log.subscribe([&] { first += log.last_sequence() > 0 ? 1 : 0; });
+  {
+    const auto passing = log.subscribe([&] { ++second; });
+    publish(log);
+  }
   publish(log);
+  EXPECT_EQ(first, 2);
+  EXPECT_EQ(second, 1);
+  auto moved = std::move(kept);
   publish(log);
-  EXPECT_EQ(first, (std::vector<std::uint64_t>{1, 2}));
-  EXPECT_EQ(second, first);
+  EXPECT_EQ(first, 3) << "moving a subscription keeps it";
+  moved = {};
+  publish(log);
+  EXPECT_EQ(first, 3);
 }
 
-TEST(EventLog, AListenerIsNotCalledAfterItsSubscriptionHasEnded) {
-  EventLog log(3);
-  int calls = 0;
-  EventLog::Subscription kept;
-  {
-    EventLog::Subscription moved = log.subscribe([&] { ++calls; });
-    publish(log);
-    kept = std::move(moved);
-  }
+TEST(EventLog, KeepsTheLatestOfEachNameAlsoWhenManyOthersFollow) {
+  EventLog log(2);
   publish(log);
-  EXPECT_EQ(calls, 2) << "a subscription that was moved goes on";
-  kept = {};
-  publish(log);
-  EXPECT_EQ(calls, 2);
-  {
-    const auto brief = log.subscribe([&] { ++calls; });
-  }
-  publish(log);
-  EXPECT_EQ(calls, 2);
+  for (int i = 0; i < 5; ++i) log.publish("other", [](std::uint64_t) { return "x"; });
+  ASSERT_TRUE(log.latest("result"));
+  EXPECT_EQ(log.latest("result")->sequence, 1U);
+  EXPECT_EQ(log.latest("result")->name, "result");
+  EXPECT_EQ(log.latest("other")->sequence, 6U);
+  EXPECT_FALSE(log.latest("third"));
+  EXPECT_EQ(log.after(5)->name, "other");
+}
+
+TEST(EventLog, EachRunHasANameOfItsOwn) {
+  const EventLog one(1);
+  const EventLog other(1);
+  EXPECT_EQ(one.run().size(), 8U);
+  EXPECT_NE(one.run(), other.run());
 }
 
 }  // namespace

@@ -1,0 +1,27 @@
+#include "daemon/api/frame_jpeg.h"
+
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+
+namespace eigenpose {
+namespace {
+
+constexpr int quality = 85;
+
+}  // namespace
+
+std::shared_ptr<const std::string> FrameJpeg::of(const Frame& frame) {
+  const std::lock_guard lock(mutex_);
+  if (bytes_ && frame.sequence == sequence_ && frame.exposure_start == exposure_start_) return bytes_;
+  cv::Mat image = frame.image;
+  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 256.0);
+  std::vector<unsigned char> encoded;
+  cv::imencode(".jpg", image, encoded, {cv::IMWRITE_JPEG_QUALITY, quality});
+  bytes_ = std::make_shared<const std::string>(encoded.begin(), encoded.end());
+  sequence_ = frame.sequence;
+  exposure_start_ = frame.exposure_start;
+  return bytes_;
+}
+
+}  // namespace eigenpose
