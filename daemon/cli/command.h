@@ -10,6 +10,8 @@
 #include <functional>
 #include <stop_token>
 
+#include "core/base/error.h"
+
 namespace CLI {
 class App;
 }
@@ -20,8 +22,14 @@ namespace eigenpose::cli {
 enum ExitCode : int {
   exit_done = 0,           ///< all went well
   exit_failed = 1,         ///< something a person can do something about; one line on stderr says what
-  exit_usage = 2,          ///< the line was not understood
+  exit_usage = 2,          ///< the command line cannot be obeyed; one line on stderr says why
   exit_interrupted = 130,  ///< stopped by Ctrl-C or SIGTERM, everything left tidy
+};
+
+/// Options that do not go together, found only when the command runs. Ends with exit_usage.
+class UsageError : public Error {
+ public:
+  using Error::Error;
 };
 
 /// What the line asks for.

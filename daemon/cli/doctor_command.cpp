@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "core/base/printable.h"
 #include "daemon/cli/hardware_commands.h"
 #include "daemon/cli/rig_options.h"
 #include "daemon/hardware/checkup.h"
@@ -15,7 +16,7 @@
 namespace eigenpose::cli {
 namespace {
 
-const char* word(Health health) {
+const char* health_name(Health health) {
   switch (health) {
     case Health::good:
       return "ok";
@@ -38,13 +39,14 @@ class Doctor {
     }
     if (finding.health == Health::note) ++notes_;
     if (json_) {
-      findings_.push_back({{"health", word(finding.health)},
+      findings_.push_back({{"health", health_name(finding.health)},
                            {"subject", finding.subject},
                            {"what", finding.what},
                            {"remedy", finding.remedy}});
       return;
     }
-    std::printf("%-6s %s: %s\n", word(finding.health), finding.subject.c_str(), finding.what.c_str());
+    std::printf("%-6s %s: %s\n", health_name(finding.health), printable(finding.subject).c_str(),
+                printable(finding.what).c_str());
     if (!finding.remedy.empty()) std::printf("       -> %s\n", finding.remedy.c_str());
     std::fflush(stdout);
   }
@@ -87,13 +89,13 @@ int examine(const RigOptions& rig, bool json, const std::stop_token& stop) {
   check_machine({}, config, take_inventory(), report);
   if (is_service_running(config)) {
     report({Health::note, "service", "eigenposed is running and holds the devices, so they were not asked",
-            "'eigenpose status' tells what it sees; to ask the devices: systemctl stop eigenposed"});
+            "'eigenpose status' shows them; to ask the devices, run systemctl stop eigenposed first"});
     return doctor.finish();
   }
   const SteadyClock clock;
   try {
     Devices devices = make_devices(config, clock);
-    // A device that is not there or may not be opened has been told already.
+    // A device that is not there or may not be opened has been reported already.
     std::erase_if(devices.axes,
                   [&](const RigAxis& axis) { return doctor.has_faulted("axis " + axis.options.dof.name); });
     std::erase_if(devices.lamps,

@@ -1,4 +1,4 @@
-/// `eigenpose evaluate`: how well objects are told apart, measured on views that were not learned.
+/// `eigenpose evaluate`: how well objects are distinguished, measured on views that were not learned.
 
 #include <algorithm>
 #include <cstdio>
@@ -25,7 +25,7 @@ using nlohmann::json;
 constexpr const char* evaluate_examples = R"(
 Learns every k-th view of each object and recognises all others. Nothing of a test view influences learning or
 thresholds. A view counts as recognised when the nearest object is the right one; how many of those would have been
-reported as unknown or ambiguous is told beside it. Pose errors are over recognised views.
+reported as unknown or ambiguous is printed beside it. Pose errors are over recognised views.
 
 Examples:
   eigenpose evaluate sets/coil-20 --learn-every 2 --components 20 --size 128
@@ -34,7 +34,7 @@ Examples:
   eigenpose evaluate sets/coil-20 --perturb shift=2,scale=0.03,rotation=3 --seed 7
   eigenpose evaluate sets/coil-20 --occlude 0.2 --leave-one-out
   eigenpose evaluate sets/table --scenes 200                (several objects in one picture, apart)
-  eigenpose evaluate sets/table --scenes 200 --overlap 0.2  (touching, or covering one another a little))";
+  eigenpose evaluate sets/table --scenes 200 --overlap 0.2  (touching, or occluding one another a little))";
 
 struct EvaluateOptions {
   std::string sets;
@@ -138,7 +138,7 @@ void print(const EvaluationReport& report) {
     const auto errors = summarize_errors(object.pose_errors);
     std::printf("%-16s %8zu %6zu %7zu %9zu %10zu %9.2f° %7.2f°%s\n", object.object.c_str(),
                 object.learned_views, object.test_views, object.right, object.rejected, object.ambiguous,
-                errors.mean, errors.median, object.pose_observable ? "" : "  pose cannot be seen");
+                errors.mean, errors.median, object.pose_observable ? "" : "  pose not observable");
   }
   std::printf("* of the right ones: would be reported as unknown or ambiguous\n\n");
   for (const auto& [pair, views] : report.confusions)
@@ -154,7 +154,7 @@ void print(const EvaluationReport& report) {
               100.0 * static_cast<double>(report.rejected) / n,
               100.0 * static_cast<double>(report.ambiguous) / n);
   if (report.strangers > 0)
-    std::printf("strangers   %.2f %% of %zu views of objects left out were taken for another\n",
+    std::printf("unknown     %.2f %% of %zu views of objects left out were falsely accepted\n",
                 100.0 * static_cast<double>(report.false_accepts) / static_cast<double>(report.strangers),
                 report.strangers);
   if (report.scenes) {
@@ -166,7 +166,7 @@ void print(const EvaluationReport& report) {
     };
     std::printf(
         "scenes      %zu with %zu objects: %.2f %% found, %.2f %% the right object, %.2f %% recognised; %zu "
-        "boxes of nothing\n"
+        "false detections\n"
         "            pose error mean %.2f°, median %.2f°\n",
         scenes.scenes, scenes.objects, of_all(scenes.found), of_all(scenes.right), of_all(scenes.recognized),
         scenes.extra, errors.mean, errors.median);
@@ -216,13 +216,13 @@ int run_evaluate(const EvaluateOptions& options, const std::stop_token& stop) {
   evaluation.learn_every = options.learn_every;
   evaluation.offset = options.offset;
   evaluation.learning = learning_options(options.learning, sets, options.sets);
-  evaluation.threads = options.learning.threads;
+  evaluation.threads = options.learning.options.threads;
   evaluation.recognizer = options.recognizer;
   evaluation.damage = parse_damage(options);
   evaluation.leave_one_out = options.leave_one_out;
   if (options.scenes.overlap && options.scenes.count == 0)
     throw ConfigError(
-        "--overlap says how objects of --scenes stand; say how many scenes, as in --scenes 200");
+        "--overlap says how the objects of --scenes stand; give their number too, as in --scenes 200");
   evaluation.scenes = options.scenes;
   evaluation.scenes.seed = options.seed;
   evaluation.learning.calibration.rate = options.rejection_rate;
@@ -256,20 +256,20 @@ void add_evaluate_command(CLI::App& app, CommandLine& line) {
           "--perturb", options->perturb,
           "Move test pictures at random, each way: shift=PIXELS (of 128), scale=SHARE, rotation=DEGREES")
       ->delimiter(',');
-  command->add_option("--occlude", options->occlude, "Cover this share of test pictures with a black square")
+  command->add_option("--occlude", options->occlude, "Hide this share of test pictures behind a black square")
       ->check(CLI::Range(0.0, 0.9));
   command->add_option("--seed", options->seed, "Seed of --perturb, --occlude and --scenes")
       ->capture_default_str();
   command->add_flag("--leave-one-out", options->leave_one_out,
-                    "Also show each object to a model without it: strangers");
+                    "Also show each object to a model without it: unknown objects");
   command
       ->add_option("--scenes", options->scenes.count,
-                   "Also show so many scenes composed of test views, 2 to 4 objects each")
+                   "Also show this number of scenes composed of test views, 2 to 4 objects each")
       ->check(CLI::Range(0, 1000000));
   command
       ->add_option(
           "--overlap", options->scenes.overlap,
-          "Objects of a scene touch, and cover up to this share of each other; without it they stand "
+          "Objects of a scene touch, and occlude up to this share of each other; without it they stand "
           "apart")
       ->check(CLI::Range(0.0, 0.9));
   command

@@ -30,7 +30,7 @@ std::vector<Place> along(const Manifold& manifold, std::size_t d) {
   return places;
 }
 
-std::vector<double> numbers(const Eigen::VectorXd& vector) {
+std::vector<double> components(const Eigen::VectorXd& vector) {
   return {vector.data(), vector.data() + vector.size()};
 }
 
@@ -44,8 +44,8 @@ nlohmann::json geometry_json(const ModelObject& object) {
       places.push_back({{"q", place.q},
                         {"speed", place.geometry.speed},
                         {"curvature", place.geometry.curvature},
-                        {"tangent", numbers(place.geometry.tangent)},
-                        {"normal", numbers(place.geometry.normal)}});
+                        {"tangent", components(place.geometry.tangent)},
+                        {"normal", components(place.geometry.normal)}});
     axes.push_back(
         {{"dof", object.workspace[d].name}, {"unit", object.workspace[d].unit}, {"places", places}});
   }

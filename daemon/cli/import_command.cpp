@@ -221,12 +221,12 @@ void add_turned(CLI::App& import, CommandLine& line) {
 void add_import_command(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("import", "Turn photographs into image sets");
   command->require_subcommand(1);
-  command->footer(
-      "'eigenpose import coil --help', 'import table --help' and 'import turned --help' explain them, with "
-      "examples.");
   add_coil(*command, line);
   add_table(*command, line);
   add_turned(*command, line);
+  command->footer(
+      "'eigenpose import coil --help', 'import table --help' and 'import turned --help' explain them, with "
+      "examples.");
 }
 
 }  // namespace eigenpose::cli

@@ -95,7 +95,7 @@ void print(const Model& model) {
       const Dof& dof = object.workspace[d];
       std::printf("%s%s: %zu values in %g…%g %s%s%s", d > 0 ? "; " : "", dof.name.c_str(),
                   object.manifold.axes()[d].samples.size(), dof.lower, dof.upper, dof.unit.c_str(),
-                  dof.periodic ? ", closed" : "", object.dof_observable[d] ? "" : ", cannot be seen");
+                  dof.periodic ? ", periodic" : "", object.dof_observable[d] ? "" : ", not observable");
     }
     std::printf("\n");
   }

@@ -25,7 +25,7 @@ Examples:
   eigenpose lab place mug --hand           the same by a hand that comes and goes
   eigenpose lab truth                      what stands there, and how it is turned
   eigenpose lab clear                      empty the table
-  eigenpose lab fault camera --stalled     break something; without options it is well again
+  eigenpose lab fault camera --stalled     break something; without options it is repaired
   eigenpose lab fault wire silence -n 3    the next three Modbus requests get no answer)";
 
 struct LabOptions {
@@ -134,7 +134,7 @@ CLI::App* add(CLI::App& parent, const char* name, const char* what,
 }
 
 void add_faults(CLI::App& lab, const std::shared_ptr<LabOptions>& options, CommandLine& line) {
-  CLI::App* fault = lab.add_subcommand("fault", "Break something, or make it well again");
+  CLI::App* fault = lab.add_subcommand("fault", "Break something, or repair it");
   fault->require_subcommand(1);
   CLI::App* camera = add(*fault, "camera", "Faults of the camera; those not named are ended", options, line,
                          [](const LabOptions& chosen) {
@@ -170,7 +170,6 @@ void add_faults(CLI::App& lab, const std::shared_ptr<LabOptions>& options, Comma
 void add_lab_command(CLI::App& app, CommandLine& line) {
   const auto options = std::make_shared<LabOptions>();
   CLI::App* lab = app.add_subcommand("lab", "The simulated lab: place objects, know the truth, break things");
-  lab->footer(lab_examples);
   lab->require_subcommand(1);
 
   add(*lab, "list", "What can be placed", options, line, list);
@@ -205,6 +204,7 @@ void add_lab_command(CLI::App& app, CommandLine& line) {
   });
   lamp->add_option("level", options->level, "0 dark ... 1 full")->required();
   add_faults(*lab, options, line);
+  lab->footer(lab_examples);  // last: the commands above would take it over
 }
 
 }  // namespace eigenpose::cli

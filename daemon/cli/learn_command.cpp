@@ -5,10 +5,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "core/base/atomic_file.h"
 #include "core/base/printable.h"
@@ -73,7 +75,7 @@ void print(const Model& model, const LearningReport& report, const std::string& 
     const double error = median(report.evidence[o].left_out_errors.front());
     std::printf("%-16s %6zu %18.4f  ", object.name.c_str(), object.views, model.rejection_distance(o));
     if (!object.pose_observable)
-      std::printf("cannot be seen: left-out views are %.0f %s off\n", error,
+      std::printf("not observable: left-out views are %.0f %s off\n", error,
                   object.workspace[0].unit.c_str());
     else if (std::isnan(error))
       std::printf("not checked: too few views\n");
@@ -132,24 +134,38 @@ Lesson next_lesson(const LearnOptions& options) {
   lesson.sets = updated_sets(*lesson.kept, options.remove, lesson.images);
   if (lesson.sets.empty()) throw ConfigError("--remove: no object would be left");
   lesson.options.program_version = EIGENPOSE_VERSION;
-  lesson.options.threads = options.learning.threads;
+  lesson.options.threads = options.learning.options.threads;
   lesson.options.memory_limit = memory_limit(options.learning);
   lesson.options.kept_views = views_file(options.to);
   return lesson;
 }
 
+/// The service takes no other options than these. @throws UsageError naming the first that it does not take.
+int run_learn_at_service(const LearnOptions& options, const CLI::App& command, const std::stop_token& stop) {
+  const std::set<std::string> taken = {"help", "components", "objects", "socket", "json"};
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || option->get_lnames().empty()) continue;
+    const std::string& name = option->get_lnames().front();
+    if (!taken.contains(name))
+      throw UsageError(
+          "--" + name +
+          " needs a folder of image sets; without one the running service learns as it is configured");
+  }
+  nlohmann::json body = nlohmann::json::object();
+  if (command.count("--components") > 0) body["components"] = options.learning.options.solver.components;
+  if (!options.learning.objects.empty()) body["objects"] = options.learning.objects;
+  return learn_at_service(options.service, body, stop);
+}
+
 int run_learn(LearnOptions options, const CLI::App& command, const std::stop_token& stop) {
   const bool update = !options.update.empty();
-  if (options.sets.empty() && !update) {
-    const int components =
-        command.count("--components") > 0 ? static_cast<int>(options.learning.components) : 0;
-    return learn_at_service(options.service, components, stop);
-  }
+  if (options.sets.empty() && !update) return run_learn_at_service(options, command, stop);
+  if (options.service.json) throw UsageError("--json is for learning by the service, without a folder");
   if (options.sets.empty() && !options.learning.objects.empty())
     throw ConfigError(
         "--objects: it chooses from image sets, and none are given; --remove names objects that leave");
   if (options.to.empty()) options.to = options.update;
-  if (options.to.empty()) throw Error("the model needs a name: add --to FILE");
+  if (options.to.empty()) throw UsageError("the model needs a name; add --to FILE");
   { const AtomicFile writable(options.to); }  // said now, not when all is learned
   Lesson lesson = update ? next_lesson(options) : new_lesson(options);
   const auto folder = std::filesystem::path(options.to).parent_path();

@@ -65,14 +65,14 @@ void choose_type(const LearningArguments& arguments, std::span<const ImageSet> s
 }  // namespace
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments) {
-  command.add_option("--components", arguments.components, "Dimensions of the eigenspace (K)")
+  command.add_option("--components", arguments.options.solver.components, "Dimensions of the eigenspace (K)")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   command
-      .add_option("--energy", arguments.energy,
+      .add_option("--energy", arguments.options.solver.energy,
                   "Keep this share of the scatter (0…1) in at most K dimensions")
       ->check(CLI::Range(0.0, 1.0));
-  command.add_option("--size", arguments.size, "Side of a normalised view, pixels")
+  command.add_option("--size", arguments.options.normalization.size, "Side of a normalised view, pixels")
       ->check(CLI::Range(8, 256))
       ->capture_default_str();
   auto* color = command.add_flag("--color", arguments.color,
@@ -82,14 +82,15 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_flag("--whole-region", arguments.whole_region,
                    "Compare whole regions alone: no windows, no alignment");
   command
-      .add_option("--solver", arguments.solver,
+      .add_option("--solver", arguments.options.solver.solver,
                   "auto, gram, krylov, conjugate-gradient, sta, joined or dense")
       ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "joined", "dense"}))
       ->capture_default_str();
-  command.add_option("--degree", arguments.degree, "Degree of the spline: 1, 2 or 3")
+  command.add_option("--degree", arguments.options.spline_degree, "Degree of the spline: 1, 2 or 3")
       ->check(CLI::Range(1, 3))
       ->capture_default_str();
-  command.add_option("--threads", arguments.threads, "Threads; 0 means all cores")->capture_default_str();
+  command.add_option("--threads", arguments.options.threads, "Threads; 0 means all cores")
+      ->capture_default_str();
   command
       .add_option("--memory-limit", arguments.memory_limit_mib,
                   "MiB for views and solver; views that do not fit are kept on disk. 0 means no limit")
@@ -194,17 +195,11 @@ void check_complete(std::span<const ImageSet> sets) {
 
 LearningOptions learning_options(const LearningArguments& arguments, std::span<const ImageSet> sets,
                                  const std::string& folder) {
-  LearningOptions options;
   check_complete(sets);
-  options.normalization.size = arguments.size;
+  LearningOptions options = arguments.options;
   choose_type(arguments, sets, options.normalization);
   options.parts = !arguments.whole_region;
   options.memory_limit = memory_limit(arguments);
-  options.solver.solver = arguments.solver;
-  options.solver.components = arguments.components;
-  options.solver.energy = arguments.energy;
-  options.spline_degree = arguments.degree;
-  options.threads = arguments.threads;
   options.image_sets = absolute_folder(folder);
   options.program_version = EIGENPOSE_VERSION;
   return options;

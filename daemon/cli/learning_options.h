@@ -3,7 +3,6 @@
 /// The options of learning that `learn` and `evaluate` share.
 
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,18 +16,15 @@ class App;
 
 namespace eigenpose::cli {
 
+/// What the line says of learning: the library's own options where a flag is one of them, and what has yet to
+/// be translated into them.
 struct LearningArguments {
-  std::size_t components = 20;
-  std::optional<double> energy;
-  int size = 64;
+  LearningOptions options;
+  std::string type;  ///< --type
   bool color = false;
   bool grey = false;
-  std::string type;
   bool whole_region = false;
   double memory_limit_mib = 0.0;
-  std::string solver = "auto";
-  int degree = 2;
-  unsigned threads = 0;
   std::vector<std::string> objects;
   bool strict = false;
 };

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "core/base/similar_word.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
 #include "daemon/cli/hardware_commands.h"
@@ -60,7 +61,7 @@ Start here:
   eigenpose evaluate SETS --learn-every 2                  measure how well that works
 
 'eigenpose COMMAND --help' explains one command, with examples.
-Exit code: 0 done, 1 failed (one line on stderr says why), 2 line not understood, 130 interrupted.)";
+Exit code: 0 done, 1 failed (one line on stderr says why), 2 usage error, 130 interrupted.)";
 
 /// Waits for SIGINT and SIGTERM on a thread of its own. The first asks for a stop, the second ends the
 /// program.
@@ -105,6 +106,9 @@ int complain(const std::exception_ptr& failure) {
   } catch (const Interrupted& interrupted) {
     warn(interrupted.what());
     return exit_interrupted;
+  } catch (const UsageError& error) {
+    warn(std::string("usage error: ") + error.what());
+    return exit_usage;
   } catch (const std::bad_alloc&) {
     warn("out of memory; fewer views, a smaller --size or --grey need less");
   } catch (const std::filesystem::filesystem_error& error) {
@@ -126,6 +130,32 @@ int finished(const std::function<int()>& work) {
   }
 }
 
+/// What a line that CLI11 refuses should say: the word that is not known and the one that was meant, or
+/// CLI11's own text.
+std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App* command = &app;
+  std::string name = app.get_name();
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    name += " " + command->get_name();
+  }
+  const std::vector<std::string> unknown = app.remaining(true);
+  const std::string help = "; '" + name + " --help' explains";
+  if (unknown.empty()) return error.what() + help;
+  const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  const bool is_option = word.starts_with('-');
+  std::vector<std::string> known;
+  if (is_option)
+    for (const CLI::Option* option : command->get_options())
+      for (const std::string& long_name : option->get_lnames()) known.push_back("--" + long_name);
+  else
+    for (const CLI::App* each : command->get_subcommands({})) known.push_back(each->get_name());
+  if (known.empty()) return "\"" + word + "\" is one argument too many" + help;
+  std::string text = std::string("there is no ") + (is_option ? "option" : "command") + " \"" + word + "\"";
+  if (const auto meant = similar_word(word, known)) text += ", did you mean \"" + *meant + "\"?";
+  return text + help;
+}
+
 int run(int argc, char** argv) {
   prepare_output();
   SignalWatch signals;
@@ -134,16 +164,16 @@ int run(int argc, char** argv) {
 
   CLI::App app(about, "eigenpose");
   app.set_version_flag("--version", std::string("eigenpose ") + EIGENPOSE_VERSION);
-  app.footer(first_steps);
   add_man_flag(app, 1, "eigenposed(8)");
   app.require_subcommand(1);
   for (const AddCommand add : commands) add(app, line);
+  app.footer(first_steps);  // last: a command takes over the footer of its parent
 
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return finished([&] { return app.exit(error); });  // --help, --version
-    warn(std::string(error.what()) + "; 'eigenpose --help' and 'eigenpose COMMAND --help' explain");
+    warn("usage error: " + usage_text(app, error));
     return exit_usage;
   }
   return finished(line.action);

@@ -1,6 +1,5 @@
 /// `eigenpose recognize`: what is in a picture.
 
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <span>
@@ -16,9 +15,10 @@
 #include "core/image/picture_file.h"
 #include "core/model/model_file.h"
 #include "core/recognition/recognizer.h"
+#include "daemon/api/json/outcome_json.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/console.h"
-#include "daemon/cli/outcome_json.h"
+#include "daemon/cli/outcome_text.h"
 #include "daemon/cli/recognizer_options.h"
 
 namespace eigenpose::cli {
@@ -40,43 +40,9 @@ struct RecognizeOptions {
   bool as_json = false;
 };
 
-/// "12.3 deg ±0.4"
-std::string pose_text(const Outcome& outcome, const Model& model) {
-  std::string text;
-  for (const ModelObject& object : model.objects) {
-    if (object.name != outcome.best->object) continue;
-    for (std::size_t d = 0; d < outcome.best->q.size(); ++d) {
-      char value[96];
-      const Dof& dof = object.workspace[d];
-      const double sigma = d < outcome.q_sigma.size() ? outcome.q_sigma[d] : INFINITY;
-      if (std::isfinite(sigma))
-        std::snprintf(value, sizeof value, "%s %.1f %s ±%.1f", dof.name.c_str(), outcome.best->q[d],
-                      dof.unit.c_str(), sigma);
-      else
-        std::snprintf(value, sizeof value, "%s not to be seen", dof.name.c_str());
-      text += (text.empty() ? "" : ", ") + std::string(value);
-    }
-  }
-  return text;
-}
-
 void print(const Outcome& outcome, const Model& model) {
-  const std::string verdict(verdict_name(outcome.verdict));
-  std::printf("  %4d,%-4d %4dx%-4d  %-14s ", outcome.box.x, outcome.box.y, outcome.box.width,
-              outcome.box.height, verdict.c_str());
-  if (!outcome.best) {
-    std::printf("\n");
-    return;
-  }
-  if (outcome.verdict == Verdict::unknown)
-    std::printf("nearest: %s, distance %.3f, allowed %.3f\n", outcome.best->object.c_str(),
-                outcome.best->distance, outcome.rejection_distance);
-  else
-    std::printf(
-        "%s  %s  distance %.3f, confidence %.2f%s%s\n", outcome.best->object.c_str(),
-        pose_text(outcome, model).c_str(), outcome.best->distance, outcome.confidence,
-        outcome.verdict == Verdict::ambiguous && outcome.runner_up ? ", or " : "",
-        outcome.verdict == Verdict::ambiguous && outcome.runner_up ? outcome.runner_up->object.c_str() : "");
+  std::printf("  %4d,%-4d %4dx%-4d  %s\n", outcome.box.x, outcome.box.y, outcome.box.width,
+              outcome.box.height, outcome_text(outcome_json(outcome, model)).c_str());
 }
 
 /// Prints the answers, picture by picture.
@@ -87,7 +53,7 @@ class Answers {
   void outcomes(const std::string& picture, std::span<const Outcome> outcomes) {
     if (as_json_) {
       nlohmann::json list = nlohmann::json::array();
-      for (const Outcome& outcome : outcomes) list.push_back(to_json(outcome, model_));
+      for (const Outcome& outcome : outcomes) list.push_back(outcome_json(outcome, model_));
       element({{"image", picture}, {"outcomes", list}});
       return;
     }
@@ -130,7 +96,11 @@ int run_recognize(const RecognizeOptions& options, const std::stop_token& stop) 
       throw Interrupted();
     }
     try {
-      answers.outcomes(name, recognizer.recognize(load_picture(name)));
+      const cv::Mat image = load_picture(name);
+      if (model->normalization.color && image.channels() == 1)
+        throw FileError(name,
+                        "is a grey picture, and the model compares colour; learn one with --grey for it");
+      answers.outcomes(name, recognizer.recognize(image));
     } catch (const FileError& wrong) {
       answers.failure(name, wrong.what());
     } catch (const std::invalid_argument& wrong) {

@@ -6,7 +6,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/base/printable.h"
 #include "daemon/cli/console.h"
+#include "daemon/cli/outcome_text.h"
 #include "daemon/cli/service_client.h"
 #include "daemon/cli/service_commands.h"
 
@@ -21,22 +23,6 @@ struct ResultsOptions {
   int count = 0;  ///< end after so many; 0: never
 };
 
-std::string words(const json& outcome) {
-  const std::string verdict = outcome.at("verdict").get<std::string>();
-  std::string text = verdict == "recognized" ? outcome.at("object").get<std::string>() : verdict;
-  if (verdict == "recognized") {
-    char number[64];
-    for (const auto& [key, value] : outcome.at("pose").items()) {
-      std::snprintf(number, sizeof number, " %s %.1f", key.c_str(), value.get<double>());
-      text += number;
-    }
-    std::snprintf(number, sizeof number, " (distance %.3f of %.3f)", outcome.at("distance").get<double>(),
-                  outcome.at("rejection_distance").get<double>());
-    text += number;
-  }
-  return text;
-}
-
 void print(const json& result) {
   std::string line = result.at("time").get<std::string>() + "  ";
   if (result.at("state") == "changing")
@@ -45,9 +31,18 @@ void print(const json& result) {
     line += "the table is empty";
   else
     for (std::size_t i = 0; i < result.at("outcomes").size(); ++i)
-      line += (i > 0 ? "; " : "") + words(result.at("outcomes")[i]);
+      line += (i > 0 ? "; " : "") + outcome_text(result.at("outcomes")[i]);
   std::printf("%s\n", line.c_str());
   flush_output();
+}
+
+/// What happened to the camera goes to stderr: stdout is for results.
+void report_camera(const ApiEvent& event) {
+  if (event.name == "camera_lost")
+    std::fprintf(stderr, "eigenpose: the service has lost the camera: %s\n",
+                 printable(json::parse(event.data).at("error").get<std::string>()).c_str());
+  else if (event.name == "camera_found")
+    std::fprintf(stderr, "eigenpose: the service has found the camera\n");
 }
 
 int run_results(const ResultsOptions& options, const std::stop_token& stop) {
@@ -65,7 +60,13 @@ int run_results(const ResultsOptions& options, const std::stop_token& stop) {
       "/v1/results",
       [&](const ApiEvent& event) {
         if (event.name == "lost") {
-          warn("too slow for the stream: " + event.data);
+          std::fprintf(
+              stderr, "eigenpose: %llu results were lost: this reader is too slow for the stream\n",
+              static_cast<unsigned long long>(json::parse(event.data).at("lost").get<std::uint64_t>()));
+          return true;
+        }
+        if (event.name != "result") {
+          report_camera(event);
           return true;
         }
         if (options.service.json) {
@@ -79,7 +80,7 @@ int run_results(const ResultsOptions& options, const std::stop_token& stop) {
       stop);
   if (stop.stop_requested()) return exit_interrupted;
   if (options.count > 0 && printed >= options.count) return exit_done;
-  throw Error("eigenposed has ended the stream: is it stopping?");
+  throw Error("eigenposed has ended the stream; 'eigenpose status' says whether it is running");
 }
 
 }  // namespace
@@ -88,9 +89,9 @@ void add_results_command(CLI::App& app, CommandLine& line) {
   const auto options = std::make_shared<ResultsOptions>();
   CLI::App* command = app.add_subcommand("results", "What the service sees on the table");
   auto* follow = command->add_flag("--follow", options->follow, "Go on: print each new result as it comes");
-  command->add_option("--count", options->count, "With --follow: end after so many results")
-      ->check(CLI::Range(1, 1'000'000'000))
-      ->needs(follow);
+  command->add_option("--count", options->count, "With --follow: end after this number of results")
+      ->needs(follow)
+      ->check(CLI::Range(1, 1'000'000'000));
   add_service_options(*command, options->service);
   command->footer("Examples:\n  eigenpose results\n  eigenpose results --follow --json | jq .outcomes");
   command->callback(

@@ -17,7 +17,7 @@ void RigOptions::add_to(CLI::App& command) {
 }
 
 Config RigOptions::read() const {
-  // What devices say goes to stderr and only if it is trouble: stdout is the command's own.
+  // Devices log to stderr, and only faults: stdout is the command's own.
   auto log = std::make_shared<spdlog::logger>("eigenpose", std::make_shared<spdlog::sinks::stderr_sink_mt>());
   log->set_level(spdlog::level::warn);
   spdlog::set_default_logger(std::move(log));

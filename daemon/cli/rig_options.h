@@ -17,7 +17,7 @@ struct RigOptions {
   std::filesystem::path runtime_dir;  ///< empty: the configuration's
 
   void add_to(CLI::App& command);
-  /// Reads the configuration; from then on devices log trouble to stderr. For a simulated rig the folder of
+  /// Reads the configuration; from then on devices log faults to stderr. For a simulated rig the folder of
   /// its sockets is made. @throws ConfigError.
   [[nodiscard]] Config read() const;
 };

@@ -45,9 +45,7 @@ nlohmann::json run_job(const ServiceOptions& options, std::string_view target, c
   return client.wait_for_job(job.at("id").get<std::string>(), progress.callback(), std::move(stop));
 }
 
-int learn_at_service(const ServiceOptions& options, int components, std::stop_token stop) {
-  nlohmann::json body = nlohmann::json::object();
-  if (components > 0) body["components"] = components;
+int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, std::stop_token stop) {
   const nlohmann::json job = run_job(options, "/v1/learn", body, std::move(stop));
   if (options.json) {
     std::printf("%s\n", job.dump(2).c_str());

@@ -37,7 +37,7 @@ nlohmann::json run_job(const ServiceOptions& options, std::string_view target, c
 
 /// `eigenpose learn` without a folder: the running service learns what it has acquired and swaps the model
 /// in.
-/// @param components 0: as the service is configured. @return the exit code.
-int learn_at_service(const ServiceOptions& options, int components, std::stop_token stop);
+/// @param body of the request: components, objects. @return the exit code.
+int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, std::stop_token stop);
 
 }  // namespace eigenpose::cli

@@ -1,5 +1,6 @@
 // The commands that need no service, run as a person runs them.
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fstream>
@@ -314,6 +315,68 @@ TEST_F(OfflineCommands, EvaluateShowsScenesOfSeveralObjects) {
   const Ended unsaid = eigenpose(line + " --overlap 0.2");
   EXPECT_EQ(unsaid.code, 1);
   EXPECT_THAT(unsaid.output, HasSubstr("--scenes 200"));
+}
+
+TEST_F(OfflineCommands, SuggestTheCommandOrOptionThatWasMeant) {
+  const auto refused = [&](const std::string& arguments) {
+    const Ended run = eigenpose(arguments);
+    EXPECT_EQ(run.code, 2) << arguments;
+    EXPECT_THAT(run.output, ::testing::StartsWith("eigenpose: usage error: ")) << arguments;
+    EXPECT_EQ(std::count(run.output.begin(), run.output.end(), '\n'), 1) << run.output;
+    return run.output;
+  };
+  EXPECT_THAT(refused("recogniz mug.png --model a.model"),
+              HasSubstr("\"recogniz\", did you mean \"recognize\"?"));
+  EXPECT_THAT(refused("import coli x"), HasSubstr("\"coli\", did you mean \"coil\"?"));
+  EXPECT_THAT(
+      refused("recognize mug.png --model a.model --jsn"),
+      AllOf(HasSubstr("\"--jsn\", did you mean \"--json\"?"), HasSubstr("'eigenpose recognize --help'")));
+  EXPECT_THAT(refused("status --sokcet=x"), HasSubstr("\"--sokcet\", did you mean \"--socket\"?"));
+  EXPECT_THAT(refused("status more"), HasSubstr("\"more\" is one argument too many"));
+  EXPECT_THAT(refused("dance"), ::testing::Not(HasSubstr("did you mean")));
+  EXPECT_THAT(refused("dance\\\x1b[2J"), ::testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(refused(""), HasSubstr("'eigenpose --help'"));
+}
+
+TEST_F(OfflineCommands, HelpOfACommandEndsWithItsOwnExamples) {
+  for (const std::string command :
+       {"acquire",   "results", "status",   "objects",   "lab",       "import",           "learn",
+        "recognize", "inspect", "resample", "evaluate",  "doctor",    "devices",          "jog",
+        "home",      "lamp",    "lab list", "lab place", "lab fault", "lab fault camera", "import coil"}) {
+    const Ended help = eigenpose(command + " --help");
+    EXPECT_EQ(help.code, 0) << command;
+    EXPECT_THAT(help.output, ::testing::Not(HasSubstr("Start here:"))) << command;
+    if (command.starts_with("lab ")) {
+      EXPECT_THAT(help.output, ::testing::Not(HasSubstr("eigenpose lab truth  "))) << command;
+    }
+  }
+  EXPECT_THAT(eigenpose("--help").output, HasSubstr("Start here:"));
+  EXPECT_THAT(eigenpose("lab --help").output, HasSubstr("eigenpose lab truth "));
+}
+
+TEST_F(OfflineCommands, RefuseOptionsThatWouldHaveNoEffect) {
+  write_objects();
+  for (const std::string arguments :
+       {"results --count 3", "learn --to a.model", "learn --size 32", "learn --grey", "learn --keep-views",
+        "learn --memory-limit 100", "learn --threads 2", "learn sets", "learn sets --to a.model --json",
+        "learn --remove duck"}) {
+    const Ended run = eigenpose(arguments + " 2>&1");
+    EXPECT_EQ(run.code, 2) << arguments << ": " << run.output;
+    EXPECT_THAT(run.output, HasSubstr("usage error")) << arguments;
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("a.model")));
+  // What the service takes is sent to it, and it is not there.
+  const Ended sent = eigenpose("learn --components 20 --objects duck,mug --socket nowhere");
+  EXPECT_EQ(sent.code, 1);
+  EXPECT_THAT(sent.output, HasSubstr("nowhere"));
+}
+
+TEST_F(OfflineCommands, PrintARecognisedObjectWithItsPoseInDegrees) {
+  write_objects();
+  ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region").code, 0);
+  EXPECT_THAT(eigenpose("recognize mug.png --model a.model").output,
+              ::testing::ContainsRegex("mug at 1(19|20)\\.[0-9]° ± [0-9.]+ \\(distance 0\\.[0-9][0-9], limit "
+                                       "0\\.[0-9][0-9], confidence [01]\\.[0-9][0-9]\\)"));
 }
 
 // Views of 256 x 256 pixels, four times the memory that learning is given, in a process that may have no more
