@@ -5,9 +5,37 @@
 #include <exception>
 #include <mutex>
 #include <thread>
-#include <vector>
+
+#include "core/base/worker_threads.h"
 
 namespace eigenpose {
+namespace {
+
+/// What the threads of one parallel_for share. Every thread first takes an index and last counts itself out:
+/// by these two atomics it sees what the caller wrote, and the caller sees what the thread wrote.
+struct Shared {
+  std::size_t count;
+  const std::function<void(std::size_t)>& work;
+  std::atomic<std::size_t> next{0};
+  std::atomic<std::size_t> ended{0};
+  std::mutex failure_mutex = {};
+  std::exception_ptr failure = {};  ///< guarded by failure_mutex
+};
+
+void take_indices(void* context) {
+  Shared& shared = *static_cast<Shared*>(context);
+  std::size_t i = shared.next.fetch_add(1);
+  try {
+    for (; i < shared.count; i = shared.next.fetch_add(1)) shared.work(i);
+  } catch (...) {
+    shared.next = shared.count;  // nobody begins anything new
+    const std::lock_guard lock(shared.failure_mutex);
+    if (!shared.failure) shared.failure = std::current_exception();
+  }
+  shared.ended.fetch_add(1);
+}
+
+}  // namespace
 
 unsigned resolved_threads(unsigned threads) {
   return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
@@ -19,25 +47,11 @@ void parallel_for(std::size_t count, unsigned threads, const std::function<void(
     for (std::size_t i = 0; i < count; ++i) work(i);
     return;
   }
-  std::atomic<std::size_t> next{0};
-  std::mutex failure_mutex;
-  std::exception_ptr failure;  // guarded by failure_mutex
-  const auto run = [&] {
-    try {
-      for (std::size_t i = next++; i < count; i = next++) work(i);
-    } catch (...) {
-      next = count;  // nobody starts anything new
-      const std::lock_guard lock(failure_mutex);
-      if (!failure) failure = std::current_exception();
-    }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    helpers.reserve(workers - 1);
-    for (std::size_t t = 1; t < workers; ++t) helpers.emplace_back(run);
-    run();
-  }
-  if (failure) std::rethrow_exception(failure);
+  Shared shared{count, work};
+  shared.next.store(0);
+  detail::call_on_threads(workers, &take_indices, &shared);
+  (void)shared.ended.load();
+  if (shared.failure) std::rethrow_exception(shared.failure);
 }
 
 }  // namespace eigenpose

@@ -1,6 +1,6 @@
 #pragma once
 
-/// How long work tells that it goes on.
+/// How long work reports that it goes on.
 
 #include <cstddef>
 #include <functional>
@@ -15,7 +15,8 @@ struct ProgressUpdate {
   std::size_t total = 0;
 };
 
-/// Called from the working thread, often; must be quick and must not throw. Empty means nobody listens.
+/// Called often, from whichever thread works, one call at a time (see WorkMeter); must be quick and must not
+/// throw. Empty means nobody listens.
 using Progress = std::function<void(const ProgressUpdate&)>;
 
 }  // namespace eigenpose

@@ -2,6 +2,7 @@
 # program outside the tree finds the same libraries as the tree itself.
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
+find_package(TBB REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(ZLIB REQUIRED)
 find_package(JPEG REQUIRED)

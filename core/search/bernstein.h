@@ -86,6 +86,12 @@ struct Joints {
   std::array<bool, max_axes> high{};  ///< beyond u_a = 1
 };
 
+/// How accurate a minimum must be.
+struct Accuracy {
+  double rounding = 0.0;  ///< absolute error that the coefficients carry
+  double distance = 0.0;  ///< of the square root of the value: p is a squared distance
+};
+
 /// Global minimum over [0,1]^m, if it is at most `cut`: branch and bound on the coefficients.
 ///
 /// A piece on which p rises or falls all the way along an axis (all first differences of one sign) has its
@@ -93,8 +99,8 @@ struct Joints {
 /// with `joints` "not found" may also mean that the neighbour comes lower. A piece whose Hessian is positive
 /// definite everywhere (by the ranges of its entries, their middle taken as unit) is finished by
 /// projected Newton, whose convex duality gap is the proof. The polynomial is a squared distance: the square
-/// root of the value found is within `distance_tolerance` of the square root of the minimum.
-Minimum minimize(const Shape& shape, const double* coefficients, double cut, double rounding,
-                 double distance_tolerance, const Joints& joints, MinimizeScratch& scratch);
+/// root of the value found is within `accuracy.distance` of the square root of the minimum.
+Minimum minimize(const Shape& shape, const double* coefficients, double cut, const Accuracy& accuracy,
+                 const Joints& joints, MinimizeScratch& scratch);
 
 }  // namespace eigenpose::bernstein

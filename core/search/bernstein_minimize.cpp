@@ -325,85 +325,113 @@ Vector place_of(const Shape& shape, std::size_t at) {
   return u;
 }
 
-}  // namespace
+/// Branch and bound over halved pieces of one polynomial.
+class Minimization {
+ public:
+  Minimization(const Shape& shape, const double* coefficients, double cut, const Accuracy& accuracy,
+               MinimizeScratch& scratch)
+      : axes_(shape.axes), size_(shape.size()), cut_(cut), accuracy_(accuracy), scratch_(scratch) {
+    scratch.reserve(size_);
+    pieces_[0].start.fill(0.0);
+    pieces_[0].width.fill(1.0);
+    pieces_[0].shape = shape;
+    std::copy(coefficients, coefficients + size_, scratch.level(0, size_));
+    best_.value = cut;
+  }
 
-Minimum minimize(const Shape& shape, const double* coefficients, double cut, double rounding,
-                 double distance_tolerance, const Joints& joints, MinimizeScratch& scratch) {
-  const int m = shape.axes;
-  const std::size_t size = shape.size();
-  scratch.reserve(size);
-  std::array<Piece, max_halvings + 1> pieces;
-  pieces[0].start.fill(0.0);
-  pieces[0].width.fill(1.0);
-  pieces[0].shape = shape;
-  std::copy(coefficients, coefficients + size, scratch.level(0, size));
-  std::size_t count = 1;
-  Minimum best;
-  best.value = cut;
-  // What a piece must stay below to matter.
-  const auto worthwhile = [&] {
-    if (!best.found) return cut;
-    const double distance = std::sqrt(std::max(best.value, 0.0));
-    const double near = distance > distance_tolerance ? distance - distance_tolerance : 0.0;
-    return std::min(best.value - rounding, near * near);
-  };
-  const auto offer = [&](const Piece& piece, const Vector& u, double value) {
-    if (!(value < best.value || (value == best.value && !best.found))) return;
-    best.found = true;
-    best.value = value;
-    for (int a = 0; a < m; ++a) best.u[a] = std::clamp(piece.start[a] + u[a] * piece.width[a], 0.0, 1.0);
-  };
-  // No squared distance is below 0: what is found at about 0 is the answer. Else a set of zeros (more axes
-  // than dimensions) would be cut into pieces without end: none of them can be left out, none is convex.
-  const double zero = distance_tolerance * distance_tolerance + 4.0 * rounding;
-  bool first = true;
-  std::size_t looked = 0;
-  while (count > 0 && (first || best.value > zero)) {
-    Piece piece = pieces[--count];
-    double* b = scratch.level(count, size);
-    std::size_t used = piece.shape.size();
-    if (*std::min_element(b, b + used) > worthwhile()) continue;
+  Minimum run(const Joints& joints) {
+    // No squared distance is below 0: what is found at about 0 is the answer. Else a set of zeros (more axes
+    // than dimensions) would be cut into pieces without end: none of them can be left out, none is convex.
+    const double zero = accuracy_.distance * accuracy_.distance + 4.0 * accuracy_.rounding;
+    while (count_ > 0 && (first_ || best_.value > zero)) {
+      Piece piece = pieces_[--count_];
+      look_at(piece, joints);
+    }
+    return best_;
+  }
+
+ private:
+  /// What a piece must stay below to matter.
+  [[nodiscard]] double worthwhile() const {
+    if (!best_.found) return cut_;
+    const double distance = std::sqrt(std::max(best_.value, 0.0));
+    const double near = distance > accuracy_.distance ? distance - accuracy_.distance : 0.0;
+    return std::min(best_.value - accuracy_.rounding, near * near);
+  }
+
+  void offer(const Piece& piece, const Vector& u, double value) {
+    if (!(value < best_.value || (value == best_.value && !best_.found))) return;
+    best_.found = true;
+    best_.value = value;
+    for (int a = 0; a < axes_; ++a) best_.u[a] = std::clamp(piece.start[a] + u[a] * piece.width[a], 0.0, 1.0);
+  }
+
+  /// Leaves a piece out, descends in it, or halves it.
+  void look_at(Piece& piece, const Joints& joints) {
+    const double rounding = accuracy_.rounding;
+    double* b = scratch_.level(count_, size_);
+    double* work = scratch_.level(max_halvings + 2, size_);
+    if (*std::min_element(b, b + piece.shape.size()) > worthwhile()) return;
     Vector depends{};
-    const bool outside =
-        comes_lower_outside(piece, b, rounding, joints, depends, scratch.level(max_halvings + 2, size));
-    if (outside && !first) continue;
-    used = piece.shape.size();
-    const auto lowest = static_cast<std::size_t>(std::min_element(b, b + used) - b);
-    if (b[lowest] > worthwhile()) continue;
+    const bool outside = comes_lower_outside(piece, b, rounding, joints, depends, work);
+    if (outside && !first_) return;
+    const auto lowest = static_cast<std::size_t>(std::min_element(b, b + piece.shape.size()) - b);
+    if (b[lowest] > worthwhile()) return;
     int widest = 0;
-    for (int a = 1; a < m; ++a)
+    for (int a = 1; a < axes_; ++a)
       if (depends[a] > depends[widest]) widest = a;
-    const bool convex =
-        !outside && is_convex(piece.shape, b, depends, rounding, scratch.level(max_halvings + 2, size));
+    const bool convex = !outside && is_convex(piece.shape, b, depends, rounding, work);
     // Where many pieces are not convex, a better value now and then leaves many of them out.
-    const bool again = ++looked >= patience && std::has_single_bit(looked);
-    if (convex || first || again) {
+    const bool again = ++looked_ >= patience && std::has_single_bit(looked_);
+    if (convex || first_ || again) {
       // Of a patch that is left out, the lowest place of its face still bounds what others must stay below.
-      const double enough = first && !convex ? rough_share * std::abs(b[lowest]) + rounding : rounding;
+      const double enough = first_ && !convex ? rough_share * std::abs(b[lowest]) + rounding : rounding;
       const Descent end = descend(piece.shape, b, place_of(piece.shape, lowest), enough);
       offer(piece, end.u, end.value);
-      if (outside || (convex && end.value - end.gap > worthwhile() - rounding)) continue;
+      if (outside || (convex && end.value - end.gap > worthwhile() - rounding)) return;
     }
-    first = false;
-    if (depends[widest] <= rounding || piece.width[widest] < 1e-12 || count + 2 > max_halvings) {
+    first_ = false;
+    if (depends[widest] <= rounding || piece.width[widest] < 1e-12 || count_ + 2 > max_halvings) {
       // So small that its polynomial is as good as quadratic: what a descent finds there is the answer.
       const Descent end = descend(piece.shape, b, place_of(piece.shape, lowest), rounding);
       offer(piece, end.u, end.value);
-      continue;
+      return;
     }
-    double* high = scratch.level(count + 1, size);
-    split(piece.shape, widest, b, b, high);
-    piece.width[widest] *= 0.5;
-    pieces[count] = pieces[count + 1] = piece;
-    pieces[count + 1].start[widest] += piece.width[widest];
+    halve(piece, widest, b);
+  }
+
+  void halve(Piece& piece, int axis, double* b) {
+    const std::size_t used = piece.shape.size();
+    double* high = scratch_.level(count_ + 1, size_);
+    split(piece.shape, axis, b, b, high);
+    piece.width[axis] *= 0.5;
+    pieces_[count_] = pieces_[count_ + 1] = piece;
+    pieces_[count_ + 1].start[axis] += piece.width[axis];
     // The nearer half is looked at first.
     if (*std::min_element(b, b + used) < *std::min_element(high, high + used)) {
       std::swap_ranges(b, b + used, high);
-      std::swap(pieces[count], pieces[count + 1]);
+      std::swap(pieces_[count_], pieces_[count_ + 1]);
     }
-    count += 2;
+    count_ += 2;
   }
-  return best;
+
+  int axes_;
+  std::size_t size_;
+  double cut_;
+  Accuracy accuracy_;
+  MinimizeScratch& scratch_;
+  std::array<Piece, max_halvings + 1> pieces_;
+  std::size_t count_ = 1;
+  std::size_t looked_ = 0;
+  bool first_ = true;
+  Minimum best_;
+};
+
+}  // namespace
+
+Minimum minimize(const Shape& shape, const double* coefficients, double cut, const Accuracy& accuracy,
+                 const Joints& joints, MinimizeScratch& scratch) {
+  return Minimization(shape, coefficients, cut, accuracy, scratch).run(joints);
 }
 
 }  // namespace eigenpose::bernstein

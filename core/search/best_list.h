@@ -57,7 +57,6 @@ class BestList {
 /// The memory of one thread for queries; grows to the largest K and count it has seen.
 struct QueryMemory {
   std::vector<double> point;      ///< the query in double
-  std::vector<float> floats;      ///< the query, in the order and padding of the tree
   std::vector<PatchPoint> slots;  ///< for BestList
 };
 QueryMemory& query_memory();

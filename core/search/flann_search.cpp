@@ -82,8 +82,8 @@ std::size_t FlannSearch::nearest_into(const Eigen::Ref<const Eigen::VectorXf>& p
   impl_->index.findNeighbors(nearest, point.data(), parameters);
   // Its distance bounds that of the manifold; the certificate asks for what lies up to a reach beyond.
   const double start = std::min(std::sqrt(static_cast<double>(nearest.squared)), bound);
-  search_samples(impl_->cloud, impl_->patches, memory.point.data(),
-                 start * (1.0 + 1e-6) + impl_->cloud.largest_reach(), bound, best, samples,
+  const double radius_at_first = start * (1.0 + 1e-6) + impl_->cloud.largest_reach();
+  search_samples(impl_->cloud, impl_->patches, {memory.point.data(), radius_at_first, bound}, best, samples,
                  [&](double radius) {
                    SamplesWithin within(static_cast<float>(radius * radius * (1.0 + 1e-6)), samples.near);
                    impl_->index.findNeighbors(within, point.data(), parameters);

@@ -92,10 +92,10 @@ void PatchSet::add_family(const Manifold& manifold) {
   }
 }
 
-std::array<std::size_t, max_manifold_dofs> PatchSet::segments_of(std::size_t patch) const {
+PatchSet::Segments PatchSet::segments_of(std::size_t patch) const {
   const std::uint32_t owner = manifold_of_[patch];
   std::size_t rest = patch - families_[owner].first_patch;
-  std::array<std::size_t, max_manifold_dofs> segments{};
+  Segments segments{};
   const auto bases = manifolds_[owner].bases();
   for (std::size_t a = bases.size(); a-- > 0;) {
     segments[a] = rest % bases[a].segments();
@@ -244,30 +244,9 @@ bool PatchSet::closest(std::size_t patch, const double* point, double cut, Patch
     memory.b.resize(family.norms);
   }
   const std::uint32_t* columns = columns_.data() + family.first_column + local * family.points;
-  const double* coefficients = manifold.coefficients().data();
-  const double* centre = coefficients + columns[family.middle] * dimensions_;
-  double ee = 0.0;
-  for (std::size_t i = 0; i < dimensions_; ++i) ee += (point[i] - centre[i]) * (point[i] - centre[i]);
-  for (std::size_t k = 0; k < family.points; ++k) {
-    const double* c = coefficients + columns[k] * dimensions_;
-    Pair sum{};
-    std::size_t i = 0;
-    for (; i + 2 <= dimensions_; i += 2)
-      sum += (load(point + i) - load(centre + i)) * (load(c + i) - load(centre + i));
-    double g = sum[0] + sum[1];
-    for (; i < dimensions_; ++i) g += (point[i] - centre[i]) * (c[i] - centre[i]);
-    memory.a[k] = g;
-  }
-  // From coefficients to Bézier points to degree 2p, one axis at a time.
-  bernstein::Shape now = shape;
   const auto segments = segments_of(patch);
-  for (int a = 0; a < shape.axes; ++a) {
-    const int p = shape.degree[a];
-    const auto extraction = manifold.bases()[family.axis[a]].extraction(segments[family.axis[a]]);
-    bernstein::apply(now, a, extraction, p + 1, memory.a.data(), memory.b.data());
-    bernstein::apply(now, a, elevation(p), 2 * p + 1, memory.b.data(), memory.a.data());
-    now.degree[a] = 2 * p;
-  }
+  const double ee = products_with_net(manifold, columns, family, point, memory.a.data());
+  elevate(manifold, family, segments, memory.a.data(), memory.b.data());
   const double* norms = norms_.data() + family.first_norm + local * family.norms;
   double lowest = std::numeric_limits<double>::infinity();
   double largest = 0.0;
@@ -285,23 +264,59 @@ bool PatchSet::closest(std::size_t patch, const double* point, double cut, Patch
   } else if (shape.axes == 1) {
     minimum = bernstein::minimize_curve(family.squared.degree[0], memory.a.data(), cut, rounding);
   } else {
-    // Splines of degree 2 and more join with equal derivatives, around the seam of a closed axis too.
-    bernstein::Joints joints;
-    for (int a = 0; a < shape.axes; ++a) {
-      const std::size_t axis = family.axis[a];
-      const bool smooth = shape.degree[a] >= 2;
-      const bool closed = manifold.axes()[axis].dof.periodic;
-      joints.low[a] = smooth && (closed || segments[axis] > 0);
-      joints.high[a] = smooth && (closed || segments[axis] + 1 < manifold.bases()[axis].segments());
-    }
-    minimum = bernstein::minimize(family.squared, memory.a.data(), cut, rounding, patch_distance_tolerance,
-                                  joints, memory.minimize);
+    minimum = bernstein::minimize(family.squared, memory.a.data(), cut, {rounding, patch_distance_tolerance},
+                                  joints_of(manifold, family, segments), memory.minimize);
   }
   if (!minimum.found) return false;
   result.u = {};
   for (int a = 0; a < shape.axes; ++a) result.u[family.axis[a]] = minimum.u[a];
   result.squared_distance = std::max(minimum.value, 0.0);
   return true;
+}
+
+double PatchSet::products_with_net(const Manifold& manifold, const std::uint32_t* columns,
+                                   const Family& family, const double* point, double* products) const {
+  const double* coefficients = manifold.coefficients().data();
+  const double* centre = coefficients + columns[family.middle] * dimensions_;
+  double ee = 0.0;
+  for (std::size_t i = 0; i < dimensions_; ++i) ee += (point[i] - centre[i]) * (point[i] - centre[i]);
+  for (std::size_t k = 0; k < family.points; ++k) {
+    const double* c = coefficients + columns[k] * dimensions_;
+    Pair sum{};
+    std::size_t i = 0;
+    for (; i + 2 <= dimensions_; i += 2)
+      sum += (load(point + i) - load(centre + i)) * (load(c + i) - load(centre + i));
+    double g = sum[0] + sum[1];
+    for (; i < dimensions_; ++i) g += (point[i] - centre[i]) * (c[i] - centre[i]);
+    products[k] = g;
+  }
+  return ee;
+}
+
+void PatchSet::elevate(const Manifold& manifold, const Family& family, const Segments& segments, double* net,
+                       double* work) {
+  bernstein::Shape now = family.shape;
+  for (int a = 0; a < family.shape.axes; ++a) {
+    const int p = family.shape.degree[a];
+    const auto extraction = manifold.bases()[family.axis[a]].extraction(segments[family.axis[a]]);
+    bernstein::apply(now, a, extraction, p + 1, net, work);
+    bernstein::apply(now, a, elevation(p), 2 * p + 1, work, net);
+    now.degree[a] = 2 * p;
+  }
+}
+
+bernstein::Joints PatchSet::joints_of(const Manifold& manifold, const Family& family,
+                                      const Segments& segments) {
+  // Splines of degree 2 and more join with equal derivatives, around the seam of a closed axis too.
+  bernstein::Joints joints;
+  for (int a = 0; a < family.shape.axes; ++a) {
+    const std::size_t axis = family.axis[a];
+    const bool smooth = family.shape.degree[a] >= 2;
+    const bool closed = manifold.axes()[axis].dof.periodic;
+    joints.low[a] = smooth && (closed || segments[axis] > 0);
+    joints.high[a] = smooth && (closed || segments[axis] + 1 < manifold.bases()[axis].segments());
+  }
+  return joints;
 }
 
 std::array<double, max_manifold_dofs> PatchSet::position(const PatchPoint& point) const {

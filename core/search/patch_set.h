@@ -76,11 +76,22 @@ class PatchSet {
     std::size_t norms = 1;         ///< Π(2p+1)
   };
   /// Segment along each axis of the manifold.
-  [[nodiscard]] std::array<std::size_t, max_manifold_dofs> segments_of(std::size_t patch) const;
+  using Segments = std::array<std::size_t, max_manifold_dofs>;
+  [[nodiscard]] Segments segments_of(std::size_t patch) const;
   void add_family(const Manifold& manifold);
   void add_patch(const Manifold& manifold, std::size_t patch);
   bool closest_on_quadratic_curve(const Family& family, std::size_t local, const double* point, double cut,
                                   PatchPoint& result) const;
+  /// With C the middle of a patch's coefficients and e = point − C: `products` gets eᵀ(c − C) of each
+  /// coefficient c. @param columns of the patch's coefficients. @return eᵀe.
+  double products_with_net(const Manifold& manifold, const std::uint32_t* columns, const Family& family,
+                           const double* point, double* products) const;
+  /// From values at spline coefficients to Bézier points to degree 2p, one axis at a time, in `net`.
+  static void elevate(const Manifold& manifold, const Family& family, const Segments& segments, double* net,
+                      double* work);
+  /// Which faces of a patch have a smooth neighbour.
+  static bernstein::Joints joints_of(const Manifold& manifold, const Family& family,
+                                     const Segments& segments);
 
   std::span<const Manifold> manifolds_;
   std::size_t dimensions_ = 0;

@@ -79,81 +79,82 @@ PatternRejector::Interval PatternRejector::extent(std::uint32_t patch,
   return {range.low - margin, range.high + margin};
 }
 
+PatternRejector::Division PatternRejector::divide_along(const Eigen::VectorXd& direction,
+                                                        std::span<const std::uint32_t> classes) const {
+  Division division;
+  division.direction = direction;
+  std::vector<double> places;
+  for (const std::uint32_t c : classes) {
+    places.push_back(direction.dot(centres_.col(c)));
+    division.extents.push_back(extent(c, direction));
+  }
+  std::sort(places.begin(), places.end());
+  for (std::size_t cell = 1; cell < options_.cells; ++cell) {
+    const double cut = places[cell * places.size() / options_.cells];
+    if (division.cuts.empty() || cut > division.cuts.back()) division.cuts.push_back(cut);
+  }
+  // Cells hold about equally many centres: the mean size of the cells' sets is what a point keeps.
+  std::size_t reached = 0;
+  for (const Interval& e : division.extents) {
+    const auto first = std::lower_bound(division.cuts.begin(), division.cuts.end(), e.low);
+    const auto last = std::upper_bound(division.cuts.begin(), division.cuts.end(), e.high);
+    reached += static_cast<std::size_t>(last - first) + 1;
+  }
+  division.reached = static_cast<double>(reached);
+  division.share = division.reached / static_cast<double>(classes.size() * (division.cuts.size() + 1));
+  return division;
+}
+
+std::optional<PatternRejector::Division> PatternRejector::best_division(
+    std::span<const std::uint32_t> classes, double budget) const {
+  const Eigen::MatrixXd directions = principal_directions(centres_, classes);
+  std::optional<Division> best;
+  for (Eigen::Index d = 0; d < directions.cols(); ++d) {
+    Division division = divide_along(directions.col(d), classes);
+    if (division.share < (best ? best->share : options_.worthwhile) && division.reached <= budget)
+      best = std::move(division);
+  }
+  return best;
+}
+
+std::size_t PatternRejector::add_leaf(std::size_t number, std::span<const std::uint32_t> classes) {
+  nodes_[number].first_class = classes_.size();
+  nodes_[number].class_count = classes.size();
+  classes_.insert(classes_.end(), classes.begin(), classes.end());
+  return number;
+}
+
 std::size_t PatternRejector::divide(std::vector<std::uint32_t> classes, std::size_t depth, double budget) {
   const std::size_t number = nodes_.size();
   nodes_.emplace_back();
-  const auto leaf = [&] {
-    nodes_[number].first_class = classes_.size();
-    nodes_[number].class_count = classes.size();
-    classes_.insert(classes_.end(), classes.begin(), classes.end());
-    return number;
-  };
-  if (classes.size() <= options_.small_set || depth >= options_.max_depth) return leaf();
-
-  // The direction on which a class reaches the fewest cells, weighed by how many classes live there.
-  const Eigen::MatrixXd directions = principal_directions(centres_, classes);
-  double best_share = options_.worthwhile;
-  double best_reached = 0.0;
-  Eigen::VectorXd best_direction;
-  std::vector<double> best_cuts;
-  std::vector<Interval> best_extents;
-  for (Eigen::Index d = 0; d < directions.cols(); ++d) {
-    const Eigen::VectorXd direction = directions.col(d);
-    std::vector<double> places;
-    std::vector<Interval> extents;
-    for (const std::uint32_t c : classes) {
-      places.push_back(direction.dot(centres_.col(c)));
-      extents.push_back(extent(c, direction));
-    }
-    std::sort(places.begin(), places.end());
-    std::vector<double> cuts;
-    for (std::size_t cell = 1; cell < options_.cells; ++cell) {
-      const double cut = places[cell * places.size() / options_.cells];
-      if (cuts.empty() || cut > cuts.back()) cuts.push_back(cut);
-    }
-    // Cells hold about equally many centres: the mean size of the cells' sets is what a point keeps.
-    std::size_t reached = 0;
-    for (const Interval& e : extents) {
-      const auto first = std::lower_bound(cuts.begin(), cuts.end(), e.low);
-      const auto last = std::upper_bound(cuts.begin(), cuts.end(), e.high);
-      reached += static_cast<std::size_t>(last - first) + 1;
-    }
-    const double share =
-        static_cast<double>(reached) / static_cast<double>(classes.size() * (cuts.size() + 1));
-    if (share < best_share && static_cast<double>(reached) <= budget) {
-      best_share = share;
-      best_reached = static_cast<double>(reached);
-      best_direction = direction;
-      best_cuts = std::move(cuts);
-      best_extents = std::move(extents);
-    }
-  }
-  if (best_direction.size() == 0) return leaf();
+  if (classes.size() <= options_.small_set || depth >= options_.max_depth) return add_leaf(number, classes);
+  const std::optional<Division> best = best_division(classes, budget);
+  if (!best) return add_leaf(number, classes);
 
   Node node;
   node.direction = directions_.size();
-  directions_.insert(directions_.end(), best_direction.data(), best_direction.data() + best_direction.size());
-  node.low = best_extents[0].low;
-  node.high = best_extents[0].high;
-  for (const Interval& e : best_extents) {
+  directions_.insert(directions_.end(), best->direction.begin(), best->direction.end());
+  node.low = best->extents[0].low;
+  node.high = best->extents[0].high;
+  for (const Interval& e : best->extents) {
     node.low = std::min(node.low, e.low);
     node.high = std::max(node.high, e.high);
   }
   node.first_cut = cuts_.size();
-  node.cuts = best_cuts.size();
-  cuts_.insert(cuts_.end(), best_cuts.begin(), best_cuts.end());
+  node.cuts = best->cuts.size();
+  cuts_.insert(cuts_.end(), best->cuts.begin(), best->cuts.end());
   node.first_child = children_.size();
-  children_.resize(children_.size() + best_cuts.size() + 1);
+  children_.resize(children_.size() + best->cuts.size() + 1);
   nodes_[number] = node;
-  for (std::size_t cell = 0; cell <= best_cuts.size(); ++cell) {
+  for (std::size_t cell = 0; cell <= best->cuts.size(); ++cell) {
     std::vector<std::uint32_t> reaching;
     for (std::size_t i = 0; i < classes.size(); ++i) {
       // A cell is closed: a point on a cut belongs to either side.
-      const bool above = cell == 0 || best_extents[i].high >= best_cuts[cell - 1];
-      const bool below = cell == best_cuts.size() || best_extents[i].low <= best_cuts[cell];
+      const bool above = cell == 0 || best->extents[i].high >= best->cuts[cell - 1];
+      const bool below = cell == best->cuts.size() || best->extents[i].low <= best->cuts[cell];
       if (above && below) reaching.push_back(classes[i]);
     }
-    const double part = budget * static_cast<double>(reaching.size()) / best_reached;
+    const double part = budget * static_cast<double>(reaching.size()) / best->reached;
     const std::size_t child = divide(std::move(reaching), depth + 1, part);
     children_[node.first_child + cell] = child;
   }

@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -68,6 +69,20 @@ class PatternRejector {
     std::size_t first_class = 0;  ///< into classes_, for a leaf
     std::size_t class_count = 0;
   };
+  /// One way to divide a set of classes.
+  struct Division {
+    double share = 1.0;    ///< of the classes that a point of the set keeps on average
+    double reached = 0.0;  ///< entries of the cells' lists together
+    Eigen::VectorXd direction;
+    std::vector<double> cuts;       ///< inner ends of the cells, ascending
+    std::vector<Interval> extents;  ///< of each class along the direction
+  };
+  [[nodiscard]] Division divide_along(const Eigen::VectorXd& direction,
+                                      std::span<const std::uint32_t> classes) const;
+  /// The division that keeps fewest classes; nothing where none is worthwhile or fits the budget.
+  [[nodiscard]] std::optional<Division> best_division(std::span<const std::uint32_t> classes,
+                                                      double budget) const;
+  std::size_t add_leaf(std::size_t number, std::span<const std::uint32_t> classes);
   /// @param budget how many entries the lists below may have together. @returns the number of the node.
   std::size_t divide(std::vector<std::uint32_t> classes, std::size_t depth, double budget);
   [[nodiscard]] Interval extent(std::uint32_t patch, const Eigen::VectorXd& direction) const;

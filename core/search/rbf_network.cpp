@@ -9,6 +9,8 @@
 #include <string>
 
 #include "core/base/linear_algebra.h"
+#include "core/base/statistics.h"
+#include "core/manifold/sample_grid.h"
 
 namespace eigenpose {
 
@@ -71,9 +73,7 @@ double smallest_width(const Eigen::MatrixXd& squared) {
     if (std::isfinite(best)) nearest.push_back(std::sqrt(best));
   }
   if (nearest.empty()) return 1.0;
-  std::nth_element(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2),
-                   nearest.end());
-  return 0.5 * nearest[nearest.size() / 2];
+  return 0.5 * upper_median(nearest);
 }
 
 /// All possible units, made orthogonal to the ones chosen already.
@@ -126,6 +126,37 @@ class Pursuit {
   Eigen::VectorXd full_;      ///< energy of each before anything was projected out
   Eigen::MatrixXd residual_;  ///< samples × L
 };
+
+/// The samples of a manifold, and the outputs of a pose network wanted there.
+struct PoseSamples {
+  Eigen::MatrixXd points;   ///< K × n
+  Eigen::MatrixXd targets;  ///< cos and sin of periodic DOFs, −1…1 for open ones
+};
+
+PoseSamples samples_of(const Manifold& f) {
+  const Grid grid = grid_of(f.axes());
+  Eigen::Index outputs = 0;
+  for (const SampleAxis& axis : f.axes()) outputs += axis.dof.periodic ? 2 : 1;
+  const auto count = static_cast<Eigen::Index>(grid.size());
+  PoseSamples result{Eigen::MatrixXd(f.dimensions(), count), Eigen::MatrixXd(outputs, count)};
+  std::vector<double> q(f.dofs());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    Eigen::Index row = 0;
+    for (std::size_t a = 0; a < f.dofs(); ++a) {
+      const Dof& dof = f.axes()[a].dof;
+      q[a] = f.axes()[a].samples[grid.index(static_cast<std::size_t>(i), a)];
+      const double share = (q[a] - dof.lower) / dof.period();
+      if (dof.periodic) {
+        result.targets(row++, i) = std::cos(2.0 * std::numbers::pi * share);
+        result.targets(row++, i) = std::sin(2.0 * std::numbers::pi * share);
+      } else {
+        result.targets(row++, i) = 2.0 * share - 1.0;
+      }
+    }
+    result.points.col(i) = f.evaluate(q);
+  }
+  return result;
+}
 
 }  // namespace
 
@@ -202,40 +233,12 @@ RbfRecognizer::RbfRecognizer(std::span<const Manifold> manifolds, const RbfOptio
       throw std::invalid_argument("a manifold has " + std::to_string(f.dimensions()) +
                                   " dimensions, the first one has " + std::to_string(dimensions_));
     axes_.emplace_back(f.axes().begin(), f.axes().end());
-    Eigen::Index count = 1;
-    Eigen::Index outputs = 0;
-    for (const SampleAxis& axis : f.axes()) {
-      count *= static_cast<Eigen::Index>(axis.samples.size());
-      outputs += axis.dof.periodic ? 2 : 1;
-    }
-    Eigen::MatrixXd own(dimensions_, count);
-    Eigen::MatrixXd targets(outputs, count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      std::vector<double> q(f.dofs());
-      auto rest = static_cast<std::size_t>(i);
-      for (std::size_t a = f.dofs(); a-- > 0;) {
-        const auto& samples = f.axes()[a].samples;
-        q[a] = samples[rest % samples.size()];
-        rest /= samples.size();
-      }
-      own.col(i) = f.evaluate(q);
-      Eigen::Index row = 0;
-      for (std::size_t a = 0; a < f.dofs(); ++a) {
-        const Dof& dof = f.axes()[a].dof;
-        const double share = (q[a] - dof.lower) / dof.period();
-        if (dof.periodic) {
-          targets(row++, i) = std::cos(2.0 * std::numbers::pi * share);
-          targets(row++, i) = std::sin(2.0 * std::numbers::pi * share);
-        } else {
-          targets(row++, i) = 2.0 * share - 1.0;
-        }
-      }
-    }
+    PoseSamples samples = samples_of(f);
     RbfReport report;
-    poses_.push_back(RbfNetwork::fit(own, targets, options, &report));
+    poses_.push_back(RbfNetwork::fit(samples.points, samples.targets, options, &report));
     unmet_ += report.bound_met ? 0 : 1;
-    total += count;
-    points.push_back(std::move(own));
+    total += samples.points.cols();
+    points.push_back(std::move(samples.points));
   }
   Eigen::MatrixXd all(dimensions_, total);
   Eigen::MatrixXd owner = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(manifolds.size()), total);

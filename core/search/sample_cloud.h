@@ -55,12 +55,20 @@ struct SampleMemory {
   std::uint32_t query = 0;
 };
 
-/// Exact search by samples. `collect(radius)` appends to `memory.near` every sample within `radius`.
-/// @param radius to begin with. It grows until the certificate holds: everything within the best distance
-/// plus the largest reach has been looked at.
+/// What search_samples() looks for.
+struct SampleQuery {
+  const double* point;  ///< K numbers
+  double radius;        ///< to begin with
+  double bound;         ///< what lies farther does not count
+};
+
+/// Exact search by samples. `collect(radius)` appends to `memory.near` every sample within `radius`. The
+/// radius grows until the certificate holds: everything within the best distance plus the largest reach has
+/// been looked at.
 template <typename Collect>
-void search_samples(const SampleCloud& cloud, const PatchSet& patches, const double* exact, double radius,
-                    double bound, BestList& best, SampleMemory& memory, const Collect& collect) {
+void search_samples(const SampleCloud& cloud, const PatchSet& patches, const SampleQuery& query,
+                    BestList& best, SampleMemory& memory, const Collect& collect) {
+  double radius = query.radius;
   if (memory.solved.size() < patches.size()) memory.solved.resize(patches.size(), 0);
   if (++memory.query == 0) {
     std::fill(memory.solved.begin(), memory.solved.end(), 0U);
@@ -80,11 +88,12 @@ void search_samples(const SampleCloud& cloud, const PatchSet& patches, const dou
       if (distance > 0.0 && distance * distance > best.cut()) continue;
       memory.solved[patch] = memory.query;
       PatchPoint found;
-      if (patches.closest(patch, exact, best.cut(), found)) best.offer(found);
+      if (patches.closest(patch, query.point, best.cut(), found)) best.offer(found);
     }
     // Float rounding of the samples is part of their reach.
     const double wanted = std::sqrt(best.cut()) + cloud.largest_reach();
-    if (wanted <= radius || radius > bound + cloud.largest_reach() || memory.near.size() == cloud.size())
+    if (wanted <= radius || radius > query.bound + cloud.largest_reach() ||
+        memory.near.size() == cloud.size())
       return;
     radius = std::isfinite(wanted) ? wanted : 2.0 * radius;
   }

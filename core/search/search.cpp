@@ -5,7 +5,6 @@
 #include <string>
 
 #include "core/search/best_list.h"
-#include "core/search/exhaustive_search.h"
 #include "core/search/flann_search.h"
 #include "core/search/rbf_search.h"
 #include "core/search/slab_search.h"
@@ -28,12 +27,10 @@ std::vector<Closest> ManifoldSearch::nearest(const Eigen::Ref<const Eigen::Vecto
 
 std::unique_ptr<ManifoldSearch> make_search(std::string_view kind, std::span<const Manifold> manifolds) {
   if (kind == "tree") return std::make_unique<TreeSearch>(manifolds);
-  if (kind == "exhaustive") return std::make_unique<ExhaustiveSearch>(manifolds);
   if (kind == "flann") return std::make_unique<FlannSearch>(manifolds);
   if (kind == "slab") return std::make_unique<SlabSearch>(manifolds);
   if (kind == "rbf") return std::make_unique<RbfSearch>(manifolds);
-  throw std::invalid_argument("unknown search \"" + std::string(kind) +
-                              "\": tree, exhaustive, flann, slab or rbf");
+  throw std::invalid_argument("unknown search \"" + std::string(kind) + "\": tree, flann, slab or rbf");
 }
 
 std::unique_ptr<ManifoldSearch> make_search(std::span<const Manifold> manifolds) {

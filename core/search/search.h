@@ -32,8 +32,8 @@ struct ClosestPoint {
 };
 
 /// Nearest-manifold search. Built once over a list of manifolds of equal K (m may differ); const calls are
-/// thread-safe. Every implementation but "rbf" gives the answer of the exhaustive oracle, up to 1e-5 in
-/// distance. Among equally near manifolds the one that stands first in the list wins.
+/// thread-safe. Every implementation but "rbf" is exact: its distance is that of an exhaustive search up to
+/// 1e-5. Among equally near manifolds the one that stands first in the list wins.
 class ManifoldSearch {
  public:
   virtual ~ManifoldSearch() = default;
@@ -66,8 +66,8 @@ class ManifoldSearch {
   std::span<const Manifold> manifolds_;
 };
 
-/// @param kind "tree" (default: exact box tree over the spline segments), "exhaustive" (the oracle), "flann"
-/// (exact single kd-tree over samples, then refinement), "slab" (Nene–Nayar), "rbf" (networks: approximate).
+/// @param kind "tree" (default: exact box tree over the spline segments), "flann" (exact single kd-tree over
+/// samples, then refinement), "slab" (Nene–Nayar), "rbf" (networks: approximate).
 /// @param manifolds are kept by reference: they outlive the search.
 /// @throws std::invalid_argument for an unknown kind, an empty list or unequal K.
 std::unique_ptr<ManifoldSearch> make_search(std::string_view kind, std::span<const Manifold> manifolds);

@@ -99,7 +99,7 @@ std::size_t SlabSearch::nearest_into(const Eigen::Ref<const Eigen::VectorXf>& po
   thread_local SlabMemory slabs;
   BestList best(std::span(memory.slots).first(results.size()), bound);
   const double start = std::min(first_radius_, bound + cloud_.largest_reach());
-  search_samples(cloud_, patches_, memory.point.data(), start, bound, best, slabs.samples,
+  search_samples(cloud_, patches_, {memory.point.data(), start, bound}, best, slabs.samples,
                  [&](double radius) { collect(point.data(), radius, slabs); });
   return finish_query(patches_, best, memory.point.data(), results);
 }

@@ -136,18 +136,11 @@ void TreeSearch::build(std::span<const float> boxes) {
   }
 }
 
-template <bool Certify>
-void TreeSearch::run(const float* point, const double* exact, BestList& best,
-                     SearchCertificate* certificate) const {
+void TreeSearch::run(const float* point, const double* exact, BestList& best) const {
   const std::size_t dims = patches_.dimensions();
   // A box farther than this in float is farther than the cut for certain (see the header).
   const double widen = 1.0 + (4.0 * static_cast<double>(dims) + 32.0) * std::ldexp(1.0, -24);
   const auto limit = [&] { return rounded_up(best.cut() * widen); };
-  double left_out = std::numeric_limits<double>::infinity();
-  const auto leave = [&](float squared) {
-    if constexpr (Certify) left_out = std::min(left_out, static_cast<double>(squared) / widen);
-  };
-
   struct Entry {
     float squared;
     std::uint32_t node;
@@ -158,10 +151,7 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best,
   float within = limit();
   while (waiting > 0) {
     const Entry entry = stack[--waiting];
-    if (entry.squared > within) {
-      leave(entry.squared);
-      continue;
-    }
+    if (entry.squared > within) continue;
     const Node node = nodes_[entry.node];
     BoxDistances distances;
     const std::uint32_t used = node.count == box_lanes ? 0xFFFFU : (1U << node.count) - 1U;
@@ -169,11 +159,6 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best,
     const std::uint32_t mask =
         kernel_(slices_.data() + entry.node * dims, point, dims, within, inner, distances) & used;
     const float* order = inner ? distances.order : distances.squared;
-    if constexpr (Certify) {
-      ++certificate->nodes;
-      for (std::uint32_t out = used & ~mask; out != 0; out &= out - 1)
-        leave(distances.squared[std::countr_zero(out)]);
-    }
     std::array<std::uint8_t, box_lanes> lanes;
     std::size_t count = 0;
     for (std::uint32_t in = mask; in != 0; in &= in - 1) {
@@ -195,18 +180,13 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best,
       continue;
     }
     for (std::size_t i = 0; i < count; ++i) {
-      if (distances.squared[lanes[i]] > within) {
-        leave(distances.squared[lanes[i]]);
-        continue;
-      }
-      if constexpr (Certify) ++certificate->patches;
+      if (distances.squared[lanes[i]] > within) continue;
       PatchPoint found;
       if (!patches_.closest(order_[node.first + lanes[i]], exact, best.cut(), found)) continue;
       best.offer(found);
       within = limit();
     }
   }
-  if constexpr (Certify) certificate->lower_bound = std::sqrt(std::min(left_out, best.cut()));
 }
 
 std::size_t TreeSearch::nearest_into(const Eigen::Ref<const Eigen::VectorXf>& point,
@@ -214,18 +194,7 @@ std::size_t TreeSearch::nearest_into(const Eigen::Ref<const Eigen::VectorXf>& po
   QueryMemory& memory = begin_query(point, patches_.dimensions(), results.size());
   if (results.empty()) return 0;
   BestList best(std::span(memory.slots).first(results.size()), bound);
-  run<false>(point.data(), memory.point.data(), best, nullptr);
-  return finish_query(patches_, best, memory.point.data(), results);
-}
-
-std::size_t TreeSearch::nearest_certified(const Eigen::Ref<const Eigen::VectorXf>& point,
-                                          std::span<ClosestPoint> results, double bound,
-                                          SearchCertificate& certificate) const {
-  certificate = {};
-  QueryMemory& memory = begin_query(point, patches_.dimensions(), results.size());
-  if (results.empty()) return 0;
-  BestList best(std::span(memory.slots).first(results.size()), bound);
-  run<true>(point.data(), memory.point.data(), best, &certificate);
+  run(point.data(), memory.point.data(), best);
   return finish_query(patches_, best, memory.point.data(), results);
 }
 

@@ -19,16 +19,6 @@
 
 namespace eigenpose {
 
-/// What a tree search has proven.
-struct SearchCertificate {
-  /// Every point of every manifold outside the answer lies at least this far away, and so does every point of
-  /// the manifolds in it that is nearer than their answer. Equal to the last answer's distance up to the
-  /// slack, or to the bound if fewer manifolds than asked for were found.
-  double lower_bound = 0.0;
-  std::size_t nodes = 0;    ///< compared with the point, 16 boxes each
-  std::size_t patches = 0;  ///< solved
-};
-
 /// The default search. Memory: 2·K floats per patch for the boxes, and the scalars of PatchSet.
 class TreeSearch final : public ManifoldSearch {
  public:
@@ -39,11 +29,6 @@ class TreeSearch final : public ManifoldSearch {
   [[nodiscard]] std::size_t nearest_into(
       const Eigen::Ref<const Eigen::VectorXf>& point, std::span<ClosestPoint> results,
       double bound = std::numeric_limits<double>::infinity()) const override;
-  /// The same, with its proof.
-  [[nodiscard]] std::size_t nearest_certified(const Eigen::Ref<const Eigen::VectorXf>& point,
-                                              std::span<ClosestPoint> results, double bound,
-                                              SearchCertificate& certificate) const;
-
   [[nodiscard]] std::string_view name() const override { return "tree"; }
   [[nodiscard]] std::size_t memory() const override;
 
@@ -52,9 +37,7 @@ class TreeSearch final : public ManifoldSearch {
     std::uint32_t first = 0;  ///< number of the first child node, or of the first entry of `order_`
     std::uint32_t count = 0;  ///< children in use, at most box_lanes
   };
-  template <bool Certify>
-  void run(const float* point, const double* exact, class BestList& best,
-           SearchCertificate* certificate) const;
+  void run(const float* point, const double* exact, class BestList& best) const;
   void build(std::span<const float> boxes);
 
   PatchSet patches_;

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "core/base/linear_algebra.h"
+#include "core/base/work_meter.h"
 #include "core/subspace/tile_products.h"
 #include "core/subspace/view_reader.h"
-#include "core/subspace/work_meter.h"
 
 namespace eigenpose {
 namespace {
@@ -36,17 +36,16 @@ Eigen::MatrixXd back_project(const AppearanceSource& source, const Eigen::Vector
 }
 
 Eigenspace eigenspace_from_gram(const AppearanceSource& source, const Eigen::VectorXd& norms,
-                                const Eigen::VectorXd& values, const Eigen::MatrixXd& vectors,
-                                double total_scatter, const BackProjectionOptions& options,
+                                const GramEigenvectors& gram, const BackProjectionOptions& options,
                                 const Progress& progress, std::stop_token stop) {
-  const Eigen::Index components = values.size();
-  Eigen::MatrixXd weights(vectors.rows(), components + 1);
-  weights.leftCols(components) = vectors * values.cwiseSqrt().cwiseInverse().asDiagonal();
-  weights.col(components).setConstant(1.0 / static_cast<double>(vectors.rows()));
+  const Eigen::Index components = gram.values.size();
+  Eigen::MatrixXd weights(gram.vectors.rows(), components + 1);
+  weights.leftCols(components) = gram.vectors * gram.values.cwiseSqrt().cwiseInverse().asDiagonal();
+  weights.col(components).setConstant(1.0 / static_cast<double>(gram.vectors.rows()));
   Eigen::MatrixXd columns = back_project(source, norms, weights, options, progress, std::move(stop));
   const Eigen::VectorXd mean = columns.col(components);
   columns.conservativeResize(Eigen::NoChange, components);
-  return finished_eigenspace(mean, std::move(columns), values, total_scatter);
+  return finished_eigenspace(mean, std::move(columns), gram.values, gram.total_scatter);
 }
 
 Eigenspace finished_eigenspace(const Eigen::VectorXd& mean, Eigen::MatrixXd basis,

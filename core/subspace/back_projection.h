@@ -25,11 +25,17 @@ Eigen::MatrixXd back_project(const AppearanceSource& source, const Eigen::Vector
                              const Eigen::MatrixXd& weights, const BackProjectionOptions& options,
                              const Progress& progress = {}, std::stop_token stop = {});
 
+/// Leading eigenpairs of a centred Gram matrix.
+struct GramEigenvectors {
+  Eigen::VectorXd values;      ///< K, descending, positive
+  Eigen::MatrixXd vectors;     ///< M × K, orthonormal, each orthogonal to (1,…,1)
+  double total_scatter = 0.0;  ///< trace of the centred Gram matrix
+};
+
 /// The eigenspace from the eigenvectors ẽ of the centred Gram matrix: e = λ^(−1/2) X ẽ (eq. 22) and the mean.
-/// @param vectors M × K, orthonormal, each orthogonal to (1,…,1). @param values K, descending, positive.
+/// @param norms as `view_norms` gives them. @throws Interrupted.
 Eigenspace eigenspace_from_gram(const AppearanceSource& source, const Eigen::VectorXd& norms,
-                                const Eigen::VectorXd& values, const Eigen::MatrixXd& vectors,
-                                double total_scatter, const BackProjectionOptions& options,
+                                const GramEigenvectors& gram, const BackProjectionOptions& options,
                                 const Progress& progress = {}, std::stop_token stop = {});
 
 /// The eigenspace from nearly orthonormal columns: orthonormalised in double, signs fixed, rounded to float.

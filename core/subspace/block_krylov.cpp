@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/base/linear_algebra.h"
+#include "core/base/random.h"
 
 namespace eigenpose {
 namespace {
@@ -94,9 +94,8 @@ class KrylovBasis {
 
  private:
   MatrixXd random_block(Index columns) {
-    std::normal_distribution<double> normal;
     MatrixXd block(size_, columns);
-    for (double& x : block.reshaped()) x = normal(random_);
+    for (double& x : block.reshaped()) x = random_.normal();
     return block;
   }
 
@@ -148,7 +147,7 @@ class KrylovBasis {
   Index last_ = 0;  ///< vectors in the last block
   Index random_vectors_ = 0;
   std::size_t products_ = 0;
-  std::mt19937_64 random_;
+  SeededRandom random_;
   MatrixXd basis_;
   MatrixXd image_;
   MatrixXd projected_;
@@ -211,7 +210,7 @@ EigenPairs leading_eigenpairs(Index size, const SymmetricProduct& product, const
   VectorXd values;
   MatrixXd coefficients;
   while (true) {
-    if (stop.stop_requested()) throw Interrupted("learning was interrupted while solving for eigenvectors");
+    if (stop.stop_requested()) throw Interrupted("interrupted while solving for eigenvectors");
     const bool full = basis.full(options.block);
     if (full || basis.complete() || basis.used() >= next_check || basis.products() >= options.max_products) {
       basis.ritz(values, coefficients);

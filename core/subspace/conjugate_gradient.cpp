@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "core/base/error.h"
 #include "core/base/linear_algebra.h"
+#include "core/base/random.h"
 
 namespace eigenpose {
 namespace {
@@ -32,7 +32,7 @@ class Search {
     VectorXd direction, previous_gradient;
     double value = e.dot(deflated(image, e));
     for (std::size_t iteration = 0; iteration < options_.max_iterations; ++iteration) {
-      if (stop.stop_requested()) throw Interrupted("learning was interrupted while solving for eigenvectors");
+      if (stop.stop_requested()) throw Interrupted("interrupted while solving for eigenvectors");
       VectorXd gradient = deflated(image, e) - value * e;
       orthogonalize(gradient);
       const double largest = found_ > 0 ? values_[0] : value;
@@ -93,16 +93,15 @@ class Search {
   }
 
   VectorXd start() {
-    std::normal_distribution<double> normal;
     VectorXd e(vectors_.rows());
-    for (double& x : e) x = normal(random_);
+    for (double& x : e) x = random_.normal();
     orthogonalize(e);
     return e.normalized();
   }
 
   const SymmetricProduct& product_;
   const ConjugateGradientOptions& options_;
-  std::mt19937_64 random_{20};
+  SeededRandom random_{20};
   MatrixXd vectors_;
   MatrixXd images_;
   VectorXd values_;

@@ -21,8 +21,6 @@ struct Eigenspace {
 
   /// basisᵀ (appearance − mean): K numbers. @throws std::invalid_argument unless appearance.size() == N.
   [[nodiscard]] Eigen::VectorXf project(const Eigen::Ref<const Eigen::VectorXf>& appearance) const;
-  /// mean + basis · point: N numbers. @throws std::invalid_argument unless point.size() == K.
-  [[nodiscard]] Eigen::VectorXf reconstruct(const Eigen::Ref<const Eigen::VectorXf>& point) const;
 };
 
 }  // namespace eigenpose

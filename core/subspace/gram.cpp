@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/base/work_meter.h"
 #include "core/subspace/view_reader.h"
-#include "core/subspace/work_meter.h"
 
 namespace eigenpose {
 namespace {
@@ -126,15 +126,18 @@ void check_known(const KnownProducts& known, std::size_t count) {
                                 std::to_string(count) + " views");
 }
 
+/// Which tiles are computed.
+enum class Tiles { all, lower_triangle };
+
 /// The products of two stretches of views in tiles; `meter` counts one unit a tile.
-void tiled_products(const Stretch& rows, const Stretch& columns, bool lower_only, const GramOptions& options,
+void tiled_products(const Stretch& rows, const Stretch& columns, Tiles wanted, const GramOptions& options,
                     Eigen::Ref<Eigen::MatrixXd> out, WorkMeter& meter) {
   const ViewBlock& a = rows.views;
   const ViewBlock& b = columns.views;
   const Kernels& kernels = options.kernels != nullptr ? *options.kernels : best_kernels();
   std::vector<TilePair> tiles;
   for (std::size_t column = 0; column * kTile < b.count; ++column) {
-    for (std::size_t row = lower_only ? column : 0; row * kTile < a.count; ++row)
+    for (std::size_t row = wanted == Tiles::lower_triangle ? column : 0; row * kTile < a.count; ++row)
       tiles.push_back({row, column});
   }
   parallel_for(tiles.size(), options.threads, [&](std::size_t t) {
@@ -194,11 +197,12 @@ Eigen::MatrixXd gram_matrix(const AppearanceSource& source, const GramOptions& o
     const auto column = static_cast<Eigen::Index>(first);
     const auto width = static_cast<Eigen::Index>(n);
     const Stretch held{band_reader.read(first, n), first};
-    tiled_products(held, held, true, options, gram.block(column, column, width, width), meter);
+    tiled_products(held, held, Tiles::lower_triangle, options, gram.block(column, column, width, width),
+                   meter);
     for (std::size_t next = first + n; next < count; next += strip) {
       const std::size_t rows = std::min(strip, count - next);
       tiled_products(
-          {stream_reader.read(next, rows), next}, held, false, options,
+          {stream_reader.read(next, rows), next}, held, Tiles::all, options,
           gram.block(static_cast<Eigen::Index>(next), column, static_cast<Eigen::Index>(rows), width), meter);
     }
   }

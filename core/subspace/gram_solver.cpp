@@ -85,7 +85,7 @@ Eigenspace solve_gram(const SolverTask& task, SolverReport& report) {
   judge(pairs, kept, report);
   const TimePoint projecting = clock.now();
   Eigenspace space =
-      eigenspace_from_gram(source, norms, pairs.values.head(kept), pairs.vectors.leftCols(kept), total,
+      eigenspace_from_gram(source, norms, {pairs.values.head(kept), pairs.vectors.leftCols(kept), total},
                            {options.threads, tiles}, task.progress, task.stop);
   report.exact_integers = source.has_bytes();
   report.gram_time = solving - start;

@@ -7,10 +7,10 @@
 #include <Eigen/Core>
 
 #include "core/base/clock.h"
+#include "core/base/work_meter.h"
 #include "core/subspace/back_projection.h"
 #include "core/subspace/orthogonalization.h"
 #include "core/subspace/solvers.h"
-#include "core/subspace/work_meter.h"
 
 namespace eigenpose::detail {
 namespace {

@@ -72,7 +72,7 @@ Eigenspace eigenspace_from_operator(const SolverTask& task, const ScatterOperato
   if (space == Space::pixels)
     return finished_eigenspace(scatter.mean(), vectors, values, scatter.total_scatter());
   vectors.rowwise() -= vectors.colwise().mean().eval();
-  return eigenspace_from_gram(task.source, scatter.norms(), values, vectors, scatter.total_scatter(),
+  return eigenspace_from_gram(task.source, scatter.norms(), {values, vectors, scatter.total_scatter()},
                               {task.options.threads, tiles}, task.progress, task.stop);
 }
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/base/work_meter.h"
 #include "core/subspace/tile_products.h"
-#include "core/subspace/work_meter.h"
 
 namespace eigenpose {
 

@@ -19,12 +19,10 @@ struct NamedSolver {
   std::string_view name;
   Solve solve;
 };
-constexpr std::array kSolvers{NamedSolver{"gram", detail::solve_gram},
-                              NamedSolver{"krylov", detail::solve_krylov},
-                              NamedSolver{"conjugate-gradient", detail::solve_conjugate_gradient},
-                              NamedSolver{"sta", detail::solve_sta},
-                              NamedSolver{"joined", detail::solve_joined},
-                              NamedSolver{"dense", detail::solve_dense}};
+constexpr std::array kSolvers{
+    NamedSolver{"gram", detail::solve_gram}, NamedSolver{"krylov", detail::solve_krylov},
+    NamedSolver{"conjugate-gradient", detail::solve_conjugate_gradient},
+    NamedSolver{"sta", detail::solve_sta}, NamedSolver{"joined", detail::solve_joined}};
 
 /// An answer that may be farther from the true subspace is refused: the sine of 0.06°.
 constexpr double kLargestSine = 1e-3;

@@ -70,7 +70,6 @@ struct SolverOptions {
   /// - "joined": an eigenspace of each block of views, made orthogonal together (orthogonalization.h). Holds
   /// the directions that count, never all views; reads each once. Leaves out a little, with proven bounds in
   /// the report. Wants `groups()` of the source.
-  /// - "dense": full eigen-solve in double; small sets, and the oracle.
   /// - "auto": gram up to some thousand views where it fits into memory, else krylov.
   std::string solver = "auto";
   /// K. At most M−1; fewer are returned where the appearances span fewer dimensions (the report says so).

@@ -30,7 +30,6 @@ SolverOptions checked_options(const AppearanceSource& source, const SolverOption
 void complete_report(const Eigenspace& space, const SolverOptions& asked, SolverReport& report);
 
 Eigenspace solve_gram(const SolverTask& task, SolverReport& report);
-Eigenspace solve_dense(const SolverTask& task, SolverReport& report);
 Eigenspace solve_krylov(const SolverTask& task, SolverReport& report);
 Eigenspace solve_conjugate_gradient(const SolverTask& task, SolverReport& report);
 Eigenspace solve_sta(const SolverTask& task, SolverReport& report);

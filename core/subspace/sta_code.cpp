@@ -13,9 +13,9 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/base/work_meter.h"
 #include "core/subspace/tile_products.h"
 #include "core/subspace/view_reader.h"
-#include "core/subspace/work_meter.h"
 
 namespace eigenpose {
 namespace {
@@ -215,16 +215,71 @@ std::size_t StaCode::bytes() const {
   return sum;
 }
 
+namespace {
+
+/// Views of a strip as unit-energy floats.
+struct UnitStrip {
+  Eigen::MatrixXf views;  ///< N × n
+  MatrixXd scales;        ///< n × 1, what each was multiplied by
+};
+
+/// Takes the views of a block. @param first number of its first view. @throws std::invalid_argument for a
+/// black view.
+void scale_strip(const ViewBlock& block, std::size_t first, unsigned threads, UnitStrip& strip) {
+  strip.views.resize(static_cast<Index>(block.length), static_cast<Index>(block.count));
+  strip.scales.resize(static_cast<Index>(block.count), 1);
+  parallel_for(block.count, threads, [&](std::size_t v) {
+    auto view = strip.views.col(static_cast<Index>(v));
+    if (block.bytes != nullptr)
+      std::copy_n(block.bytes + v * block.length, block.length, view.data());
+    else
+      std::copy_n(block.floats + v * block.length, block.length, view.data());
+    const double norm = block.bytes != nullptr ? std::sqrt(view.cast<double>().squaredNorm()) : 1.0;
+    if (!(norm > 0.0)) {
+      throw std::invalid_argument("view " + std::to_string(first + v) +
+                                  " is black: it has no energy to scale; leave it out");
+    }
+    view *= static_cast<float>(1.0 / norm);
+    strip.scales(static_cast<Index>(v), 0) = 1.0 / norm;
+  });
+}
+
+/// How a strip of views is coded.
+struct StripTask {
+  const BlockTransform& transform;
+  const Eigen::MatrixXf& views;  ///< N × n
+  std::size_t first;             ///< number of the strip's first view
+  float spatial_budget;          ///< energies that coding may change in a block
+  float temporal_budget;
+};
+
+/// Codes one position. @param changes gets ‖block − its stand-in‖² of each view.
+void code_position(const StripTask& task, std::size_t position, const Coder& coder,
+                   Eigen::Ref<Eigen::VectorXf> changes) {
+  FloatBlock coefficients, coded;
+  const std::size_t size = task.transform.size();
+  for (Index v = 0; v < task.views.cols(); ++v) {
+    const bool seen = task.transform.forward(task.views.col(v).data(), position, coefficients.data());
+    const bool black_before =
+        !coder.position.superblocks.empty() && coder.position.superblocks.back().width == 0;
+    changes[v] = !seen && black_before
+                     ? 0.0F
+                     : append_block(coder, task.first + static_cast<std::size_t>(v),
+                                    std::span(coefficients).first(size), task.spatial_budget,
+                                    task.temporal_budget, std::span(coded).first(size));
+  }
+}
+
+}  // namespace
+
 StaCode sta_code(const AppearanceSource& source, const BlockTransform& transform, const StaOptions& options,
-                 unsigned threads, std::size_t tile_memory, std::size_t memory_limit,
-                 const Progress& progress, std::stop_token stop) {
+                 const StaLimits& limits, const Progress& progress, std::stop_token stop) {
   constexpr std::size_t kStrip = 64;  // views transformed at once: as floats they take 4·N bytes each
   const std::size_t count = source.count();
-  const std::size_t length = source.length();
   StaCode code;
   code.positions.resize(transform.positions());
   code.changes = Eigen::VectorXd::Zero(static_cast<Index>(count));
-  MatrixXd sum = MatrixXd::Zero(static_cast<Index>(length), 1);
+  MatrixXd sum = MatrixXd::Zero(static_cast<Index>(source.length()), 1);
   const double blocks = static_cast<double>(transform.positions());
   const auto spatial_budget = static_cast<float>(options.spatial * options.spatial / blocks);
   const auto temporal_budget = static_cast<float>(options.temporal * options.temporal / blocks);
@@ -232,52 +287,28 @@ StaCode sta_code(const AppearanceSource& source, const BlockTransform& transform
   std::vector<float> last(transform.positions() * size);
 
   ViewReader reader(source);
-  const std::size_t strip = std::min(kStrip, reader.views_in(tile_memory));
+  const std::size_t strip = std::min(kStrip, reader.views_in(limits.tile_memory));
   WorkMeter meter(progress, std::move(stop), "coding blocks", count);
-  Eigen::MatrixXf views;
+  UnitStrip unit;
   for (std::size_t first = 0; first < count; first += strip) {
-    const std::size_t n = std::min(strip, count - first);
-    const ViewBlock block = reader.read(first, n);
-    views.resize(static_cast<Index>(length), static_cast<Index>(n));
-    MatrixXd weights(static_cast<Index>(n), 1);
-    parallel_for(n, threads, [&](std::size_t v) {
-      auto view = views.col(static_cast<Index>(v));
-      if (block.bytes != nullptr)
-        std::copy_n(block.bytes + v * length, length, view.data());
-      else
-        std::copy_n(block.floats + v * length, length, view.data());
-      const double norm = block.bytes != nullptr ? std::sqrt(view.cast<double>().squaredNorm()) : 1.0;
-      if (!(norm > 0.0)) {
-        throw std::invalid_argument("view " + std::to_string(first + v) +
-                                    " is black: it has no energy to scale; leave it out");
-      }
-      view *= static_cast<float>(1.0 / norm);
-      weights(static_cast<Index>(v), 0) = 1.0 / norm;
+    const ViewBlock block = reader.read(first, std::min(strip, count - first));
+    scale_strip(block, first, limits.threads, unit);
+    add_weighted_views(block, unit.scales, 0, limits.threads, sum);
+    const auto n = static_cast<Index>(block.count);
+    Eigen::MatrixXf changes(n, static_cast<Index>(transform.positions()));
+    const StripTask task{transform, unit.views, first, spatial_budget, temporal_budget};
+    parallel_for(transform.positions(), limits.threads, [&](std::size_t p) {
+      code_position(task, p, {code.positions[p], std::span(last).subspan(p * size, size)},
+                    changes.col(static_cast<Index>(p)));
     });
-    add_weighted_views(block, weights, 0, threads, sum);
-    Eigen::MatrixXf changes(static_cast<Index>(n), static_cast<Index>(transform.positions()));
-    parallel_for(transform.positions(), threads, [&](std::size_t p) {
-      FloatBlock coefficients, coded;
-      const Coder coder{code.positions[p], std::span(last).subspan(p * size, size)};
-      for (std::size_t v = 0; v < n; ++v) {
-        const bool seen = transform.forward(views.col(static_cast<Index>(v)).data(), p, coefficients.data());
-        const bool black_before =
-            !coder.position.superblocks.empty() && coder.position.superblocks.back().width == 0;
-        changes(static_cast<Index>(v), static_cast<Index>(p)) =
-            !seen && black_before
-                ? 0.0F
-                : append_block(coder, first + v, std::span(coefficients).first(size), spatial_budget,
-                               temporal_budget, std::span(coded).first(size));
-      }
-    });
-    code.changes.segment(static_cast<Index>(first), static_cast<Index>(n)) =
+    code.changes.segment(static_cast<Index>(first), n) =
         changes.cast<double>().rowwise().sum().unaryExpr(&rounded_up);
-    if (memory_limit > 0 && code.bytes() > memory_limit) {
+    if (limits.memory_limit > 0 && code.bytes() > limits.memory_limit) {
       throw std::invalid_argument("the coded views do not fit into the memory limit, which leaves " +
-                                  std::to_string(memory_limit) +
+                                  std::to_string(limits.memory_limit) +
                                   " bytes for them: raise it, or code more coarsely");
     }
-    meter.finished(n);
+    meter.finished(block.count);
   }
   code.mean = sum / static_cast<double>(count);
   for (const CodedPosition& position : code.positions) code.kept += position.coefficients.size();

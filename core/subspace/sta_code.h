@@ -79,15 +79,20 @@ struct StaCode {
   [[nodiscard]] std::size_t bytes() const;  ///< memory of the coefficients and superblocks
 };
 
+/// What coding may use.
+struct StaLimits {
+  unsigned threads = 0;
+  std::size_t tile_memory = 0;   ///< for views read at once, bytes; 0 means no limit
+  std::size_t memory_limit = 0;  ///< for the code, bytes; 0 means none
+};
+
 /// Codes all views of `source`, reading them once. Spatial: per block small coefficients go while
 /// their energy stays within spatial² / blocks. Temporal: a run goes on while the block differs from the
 /// run's first by an energy within temporal² / blocks. So ‖Δⱼ‖ ≤ spatial + temporal, but for the rounding to
 /// steps.
-/// @param memory_limit for the code, bytes; 0 means none. @throws std::invalid_argument beyond it,
-/// Interrupted.
+/// @throws std::invalid_argument for a black view or where the code exceeds its memory limit; Interrupted.
 StaCode sta_code(const AppearanceSource& source, const BlockTransform& transform, const StaOptions& options,
-                 unsigned threads, std::size_t tile_memory, std::size_t memory_limit,
-                 const Progress& progress = {}, std::stop_token stop = {});
+                 const StaLimits& limits, const Progress& progress = {}, std::stop_token stop = {});
 
 /// The Gram matrix of the coded views, exact up to one rounding: M × M, full. It depends on nothing but the
 /// code.

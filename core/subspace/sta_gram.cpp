@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/base/work_meter.h"
 #include "core/simd/product_kernels.h"
 #include "core/subspace/sta_code.h"
-#include "core/subspace/work_meter.h"
 
 namespace eigenpose {
 namespace {

@@ -71,7 +71,7 @@ Eigenspace solve_sta(const SolverTask& task, SolverReport& report) {
   const SteadyClock clock;
   const TimePoint start = clock.now();
   const BlockTransform transform(source.shape(), options.sta.block);
-  const StaCode code = sta_code(source, transform, options.sta, options.threads, rest / 4, rest - rest / 4,
+  const StaCode code = sta_code(source, transform, options.sta, {options.threads, rest / 4, rest - rest / 4},
                                 task.progress, task.stop);
   Eigen::MatrixXd gram =
       sta_gram(code, source.count(), transform.size(), options.threads, task.progress, task.stop);

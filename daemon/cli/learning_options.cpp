@@ -83,8 +83,8 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
                    "Compare whole regions alone: no windows, no alignment");
   command
       .add_option("--solver", arguments.options.solver.solver,
-                  "auto, gram, krylov, conjugate-gradient, sta, joined or dense")
-      ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "joined", "dense"}))
+                  "auto, gram, krylov, conjugate-gradient, sta or joined")
+      ->check(CLI::IsMember({"auto", "gram", "krylov", "conjugate-gradient", "sta", "joined"}))
       ->capture_default_str();
   command.add_option("--degree", arguments.options.spline_degree, "Degree of the spline: 1, 2 or 3")
       ->check(CLI::Range(1, 3))

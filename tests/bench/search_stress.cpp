@@ -24,6 +24,7 @@
 #include "core/search/search.h"
 #include "tests/bench/search_worlds.h"
 #include "tests/core/search/search_queries.h"
+#include "tests/support/exhaustive_search.h"
 #include "tests/support/synthetic_manifolds.h"
 
 namespace eigenpose {
@@ -72,7 +73,7 @@ class Comparison {
  public:
   /// @param name what the list is called where a search is wrong.
   Comparison(std::span<const Manifold> list, std::string name, Tally& tally)
-      : tally_(tally), name_(std::move(name)), oracle_(make_search("exhaustive", list)) {
+      : tally_(tally), name_(std::move(name)), oracle_(std::make_unique<ExhaustiveSearch>(list)) {
     for (const char* kind : kinds) searches_.push_back(make_search(kind, list));
   }
   ~Comparison() {

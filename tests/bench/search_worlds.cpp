@@ -12,6 +12,7 @@
 #include "core/search/search.h"
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solver.h"
+#include "tests/support/byte_source.h"
 
 namespace eigenpose::bench {
 

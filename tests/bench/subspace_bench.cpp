@@ -23,6 +23,7 @@
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solver.h"
 #include "tests/core/subspace/subspace_samples.h"
+#include "tests/support/byte_source.h"
 
 namespace eigenpose {
 namespace {

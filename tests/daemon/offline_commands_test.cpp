@@ -258,7 +258,7 @@ TEST_F(OfflineCommands, EverySearchSaysTheSame) {
   const json tree =
       json::parse(eigenpose("recognize mug.png --model a.model --json").output)[0]["outcomes"][0];
   EXPECT_EQ(tree["object"], "mug");
-  for (const std::string search : {"slab", "flann", "exhaustive", "tree --rejector", "rbf"}) {
+  for (const std::string search : {"slab", "flann", "tree --rejector", "rbf"}) {
     const Ended run = eigenpose("recognize mug.png --model a.model --json --search " + search);
     ASSERT_EQ(run.code, 0) << run.output;
     const json said = json::parse(run.output)[0]["outcomes"][0];

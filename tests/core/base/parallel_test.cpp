@@ -1,10 +1,15 @@
 #include "core/base/parallel.h"
 
+#include <algorithm>
 #include <atomic>
+#include <mutex>
+#include <set>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
 
 namespace eigenpose {
 namespace {
@@ -25,6 +30,61 @@ TEST(ParallelFor, HandsTheExceptionToTheCaller) {
                                 if (i == 37) throw std::runtime_error("no");
                               }),
                  std::runtime_error);
+}
+
+TEST(ParallelFor, BeginsNothingAfterAnException) {
+  std::atomic<std::size_t> begun{0};
+  EXPECT_THROW(parallel_for(100000, 4,
+                            [&](std::size_t) {
+                              ++begun;
+                              throw std::runtime_error("no");
+                            }),
+               std::runtime_error);
+  EXPECT_LE(begun, 4U) << "one a thread at most";
+}
+
+TEST(ParallelFor, NeverUsesMoreThreadsThanItMay) {
+  // More threads than this machine may have cores, so that the limit of the call is what counts.
+  const tbb::global_control many(tbb::global_control::max_allowed_parallelism, 8);
+  for (const unsigned threads : {1U, 2U, 3U}) {
+    std::mutex mutex;
+    std::set<std::thread::id> seen;  // guarded by mutex
+    std::atomic<unsigned> active{0};
+    std::atomic<bool> too_many{false};
+    parallel_for(2000, threads, [&](std::size_t) {
+      if (++active > threads) too_many = true;
+      {
+        const std::lock_guard lock(mutex);
+        seen.insert(std::this_thread::get_id());
+      }
+      --active;
+    });
+    EXPECT_FALSE(too_many);
+    EXPECT_LE(seen.size(), std::max(threads, 1U));
+    if (threads == 1) {
+      EXPECT_EQ(*seen.begin(), std::this_thread::get_id());
+    }
+  }
+}
+
+TEST(ParallelFor, MayBeNested) {
+  std::vector<std::atomic<int>> done(400);
+  parallel_for(20, 3,
+               [&](std::size_t i) { parallel_for(20, 2, [&](std::size_t j) { ++done[20 * i + j]; }); });
+  for (const auto& count : done) EXPECT_EQ(count, 1);
+}
+
+TEST(ParallelFor, ShowsTheCallerWhatTheThreadsWrote) {
+  for (int round = 0; round < 200; ++round) {
+    std::vector<std::size_t> written(16, 0);
+    parallel_for(written.size(), 4, [&](std::size_t i) { written[i] = i + 1; });
+    for (std::size_t i = 0; i < written.size(); ++i) ASSERT_EQ(written[i], i + 1);
+  }
+}
+
+TEST(ParallelFor, TakesZeroForAllCores) {
+  EXPECT_GE(resolved_threads(0), 1U);
+  EXPECT_EQ(resolved_threads(5), 5U);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "core/subspace/gram.h"
 #include "core/subspace/memory_source.h"
 #include "tests/core/subspace/subspace_samples.h"
+#include "tests/support/byte_source.h"
 
 namespace eigenpose {
 namespace {

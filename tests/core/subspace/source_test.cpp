@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/subspace/memory_source.h"
+#include "tests/support/byte_source.h"
 
 namespace eigenpose {
 namespace {

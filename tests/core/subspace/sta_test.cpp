@@ -8,6 +8,8 @@
 #include "core/subspace/solver.h"
 #include "core/subspace/sta_code.h"
 #include "tests/core/subspace/subspace_samples.h"
+#include "tests/support/byte_source.h"
+#include "tests/support/dense_solver.h"
 
 namespace eigenpose {
 namespace {
@@ -79,7 +81,7 @@ TEST(Sta, RoundsToStepsWhereItMayChangeNothingElse) {
   const ByteSource source(bytes, kPicture.length(), kPicture);
   SolverReport report;
   const Eigenspace found = solve_eigenspace(source, sta(0.0, 0.0, 6), &report);
-  const Eigenspace exact = solve_eigenspace(source, {.solver = "dense", .components = 6});
+  const Eigenspace exact = test::dense_eigenspace(source, 6);
   // Half a step in each of 576 coefficients at most: 7e-4 of a view.
   ASSERT_TRUE(report.sta);
   EXPECT_LT(report.sta->largest_change, 0.5 * sta_step * std::sqrt(576.0) + 3e-6);
@@ -97,7 +99,7 @@ TEST(Sta, HoldsItsErrorBounds) {
     for (const std::size_t components : {2U, 5U}) {
       SolverReport report;
       const Eigenspace found = solve_eigenspace(source, sta(share, share, components), &report);
-      const Eigenspace exact = solve_eigenspace(source, {.solver = "dense", .components = components});
+      const Eigenspace exact = test::dense_eigenspace(source, components);
       ASSERT_TRUE(report.sta);
       // The rounding to steps comes on top.
       EXPECT_LE(report.sta->largest_change, 2.0 * share + 0.5 * sta_step * std::sqrt(576.0));
@@ -119,7 +121,7 @@ TEST(Sta, HoldsItsBoundOnEveryInnerProduct) {
   const auto bytes = wandering_blobs(120);
   const ByteSource source(bytes, kPicture.length(), kPicture);
   const BlockTransform transform(kPicture, 4);  // whole blocks: nothing is cropped when they come back
-  const StaCode code = sta_code(source, transform, {4, 0.05, 0.05}, 2, 0, 0);
+  const StaCode code = sta_code(source, transform, {4, 0.05, 0.05}, {.threads = 2});
   const Eigen::MatrixXd coded = sta_gram(code, 120, transform.size(), 2);
   Eigen::MatrixXf views(static_cast<Eigen::Index>(kPicture.length()), 120);
   source.read(0, views);

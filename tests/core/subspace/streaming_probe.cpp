@@ -16,8 +16,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "core/subspace/file_source.h"
 #include "core/subspace/solver.h"
+#include "tests/support/byte_file_source.h"
 
 namespace {
 

@@ -11,10 +11,11 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
-#include "core/subspace/file_source.h"
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solver.h"
 #include "tests/core/subspace/subspace_samples.h"
+#include "tests/support/byte_file_source.h"
+#include "tests/support/byte_source.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define EIGENPOSE_SANITIZED 1

@@ -1,10 +1,10 @@
 #pragma once
 
-/// The oracle: every segment of every manifold, by methods the other searches do not use.
+/// The oracle of the searches: every segment of every manifold, by methods that the searches do not use.
 ///
 /// Curves of degree 1 and 2: D′ is a polynomial of degree at most 3 whose roots are written down in closed
 /// form. Everything else: every patch sampled densely, then damped Newton from the best samples of different
-/// patches. In double throughout. For tests and tiny models: the time grows with everything.
+/// patches. In double throughout; its time grows with everything.
 
 #include "core/search/search.h"
 
@@ -31,6 +31,8 @@ class ExhaustiveSearch final : public ManifoldSearch {
     std::vector<double> q;    ///< otherwise: m numbers a sample
     std::vector<std::size_t> patch;
   };
+  static void cut_segments(const Manifold& manifold, std::size_t axis, Scan& scan);
+  static void cut_samples(const Manifold& manifold, std::size_t active_axes, Scan& scan);
   [[nodiscard]] ClosestPoint closest_by_roots(std::size_t manifold, const Eigen::VectorXd& point) const;
   [[nodiscard]] ClosestPoint closest_by_samples(std::size_t manifold, const Eigen::VectorXd& point) const;
 

@@ -1,4 +1,4 @@
-#include "core/subspace/work_meter.h"
+#include "core/base/work_meter.h"
 
 #include <string>
 #include <utility>
@@ -11,8 +11,12 @@ WorkMeter::WorkMeter(const Progress& progress, std::stop_token stop, std::string
                      std::size_t total)
     : progress_(progress), stop_(std::move(stop)), stage_(stage), total_(total) {}
 
+void WorkMeter::check_stop() const {
+  if (stop_.stop_requested()) throw Interrupted("interrupted while " + std::string(stage_));
+}
+
 void WorkMeter::finished(std::size_t units) {
-  if (stop_.stop_requested()) throw Interrupted("learning was interrupted while " + std::string(stage_));
+  check_stop();
   const std::lock_guard lock(mutex_);
   done_ += units;
   if (progress_) progress_({stage_, done_, total_});

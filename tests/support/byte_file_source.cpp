@@ -1,4 +1,4 @@
-#include "core/subspace/file_source.h"
+#include "tests/support/byte_file_source.h"
 
 #include <cerrno>
 #include <cstring>
@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/subspace/memory_source.h"
+#include "tests/support/byte_source.h"
 
 namespace eigenpose {
 

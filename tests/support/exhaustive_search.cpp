@@ -1,4 +1,4 @@
-#include "core/search/exhaustive_search.h"
+#include "tests/support/exhaustive_search.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/base/grid.h"
 #include "core/base/linear_algebra.h"
 
 namespace eigenpose {
@@ -67,89 +68,110 @@ std::vector<std::size_t> active_axes(const Manifold& manifold) {
 }
 
 /// Damped Newton on ½‖f(q) − point‖² over all of the manifold, open axes clamped.
-ClosestPoint descend(const Manifold& f, const Eigen::VectorXd& point, std::vector<double> q) {
-  const std::size_t m = f.dofs();
-  const auto size = static_cast<Eigen::Index>(m);
-  const auto clamp = [&](std::vector<double>& at) {
-    for (std::size_t a = 0; a < m; ++a) {
+class NewtonDescent {
+ public:
+  NewtonDescent(const Manifold& f, const Eigen::VectorXd& point)
+      : f_(f), point_(point), unit_(static_cast<Eigen::Index>(f.dofs())) {
+    // Steps are measured in segments, so that a millimetre and a degree weigh the same.
+    for (std::size_t a = 0; a < f.dofs(); ++a) {
       const AxisBasis& basis = f.bases()[a];
+      const double width =
+          (basis.end(basis.segments() - 1) - basis.begin(0)) / static_cast<double>(basis.segments());
+      unit_[static_cast<Eigen::Index>(a)] = width > 0.0 ? width : 1.0;
+    }
+  }
+
+  ClosestPoint from(std::vector<double> q) {
+    clamp(q);
+    double value = squared_distance(q);
+    double damping = 1e-3;
+    for (int iteration = 0; iteration < 200; ++iteration)
+      if (!step(q, value, damping)) break;
+    ClosestPoint result;
+    std::copy(q.begin(), q.end(), result.q.begin());
+    result.distance = std::sqrt(value);
+    return result;
+  }
+
+ private:
+  void clamp(std::vector<double>& at) const {
+    for (std::size_t a = 0; a < f_.dofs(); ++a) {
+      const AxisBasis& basis = f_.bases()[a];
       at[a] = basis.position(basis.locate(at[a]));
     }
-  };
-  // Steps are measured in segments, so that a millimetre and a degree weigh the same.
-  Eigen::VectorXd unit(size);
-  for (std::size_t a = 0; a < m; ++a) {
-    const AxisBasis& basis = f.bases()[a];
-    const double width =
-        (basis.end(basis.segments() - 1) - basis.begin(0)) / static_cast<double>(basis.segments());
-    unit[static_cast<Eigen::Index>(a)] = width > 0.0 ? width : 1.0;
   }
-  double damping = 1e-3;
-  clamp(q);
-  double value = (f.evaluate(q) - point).squaredNorm();
-  Eigen::VectorXd second;
-  for (int iteration = 0; iteration < 200; ++iteration) {
-    const ManifoldPoint at = f.evaluate_with_jacobian(q);
-    const Eigen::VectorXd residual = at.value - point;
-    const Eigen::MatrixXd jacobian = at.jacobian * unit.asDiagonal();
-    Eigen::VectorXd gradient = jacobian.transpose() * residual;
-    const Eigen::MatrixXd gauss = jacobian.transpose() * jacobian;
-    Eigen::MatrixXd hessian = gauss;
+  [[nodiscard]] double squared_distance(const std::vector<double>& q) const {
+    return (f_.evaluate(q) - point_).squaredNorm();
+  }
+
+  /// Gradient, Hessian and its Gauss–Newton part at q, in units; axes that cannot move are held.
+  void expand(const std::vector<double>& q) {
+    const std::size_t m = f_.dofs();
+    const ManifoldPoint at = f_.evaluate_with_jacobian(q);
+    const Eigen::VectorXd residual = at.value - point_;
+    const Eigen::MatrixXd jacobian = at.jacobian * unit_.asDiagonal();
+    gradient_ = jacobian.transpose() * residual;
+    gauss_ = jacobian.transpose() * jacobian;
+    hessian_ = gauss_;
     for (std::size_t a = 0; a < m; ++a)
       for (std::size_t b = a; b < m; ++b) {
         std::vector<int> orders(m, 0);
         ++orders[a];
         ++orders[b];
-        f.derivative(q, orders, second);
+        f_.derivative(q, orders, second_);
         const auto i = static_cast<Eigen::Index>(a);
         const auto j = static_cast<Eigen::Index>(b);
-        const double extra = second.dot(residual) * unit[i] * unit[j];
-        hessian(i, j) += extra;
-        if (i != j) hessian(j, i) += extra;
+        const double extra = second_.dot(residual) * unit_[i] * unit_[j];
+        hessian_(i, j) += extra;
+        if (i != j) hessian_(j, i) += extra;
       }
-    std::vector<bool> held(m, false);
     for (std::size_t a = 0; a < m; ++a) {
-      const AxisBasis& basis = f.bases()[a];
+      const AxisBasis& basis = f_.bases()[a];
       const auto i = static_cast<Eigen::Index>(a);
-      const bool open = !f.axes()[a].dof.periodic;
-      held[a] = basis.degree() == 0 || (open && q[a] <= basis.begin(0) && gradient[i] > 0.0) ||
-                (open && q[a] >= basis.end(basis.segments() - 1) && gradient[i] < 0.0);
-      if (!held[a]) continue;
-      gradient[i] = 0.0;
-      hessian.row(i).setZero();
-      hessian.col(i).setZero();
-      hessian(i, i) = 1.0;
+      const bool open = !f_.axes()[a].dof.periodic;
+      const bool held = basis.degree() == 0 || (open && q[a] <= basis.begin(0) && gradient_[i] > 0.0) ||
+                        (open && q[a] >= basis.end(basis.segments() - 1) && gradient_[i] < 0.0);
+      if (!held) continue;
+      gradient_[i] = 0.0;
+      hessian_.row(i).setZero();
+      hessian_.col(i).setZero();
+      hessian_(i, i) = 1.0;
     }
-    bool moved = false;
-    while (damping < 1e12) {
-      Eigen::MatrixXd damped = hessian;
-      damped.diagonal() += damping * (gauss.diagonal().array() + 1e-12 * (1.0 + gauss.trace())).matrix();
-      if (const auto solved = solve_positive_definite(damped, gradient)) {
-        const Eigen::VectorXd step = -*solved;
-        std::vector<double> next = q;
-        for (std::size_t a = 0; a < m; ++a) {
-          const auto i = static_cast<Eigen::Index>(a);
-          next[a] += std::clamp(step[i], -1.0, 1.0) * unit[i];
-        }
-        clamp(next);
-        const double trial = (f.evaluate(next) - point).squaredNorm();
-        if (trial < value) {
-          moved = (value - trial) > 1e-17 * (1e-6 + value) || step.cwiseAbs().maxCoeff() > 1e-9;
-          value = trial;
-          q = next;
-          damping = std::max(damping * 0.1, 1e-15);
-          break;
-        }
-      }
-      damping *= 10.0;
-    }
-    if (!moved) break;
   }
-  ClosestPoint result;
-  std::copy(q.begin(), q.end(), result.q.begin());
-  result.distance = std::sqrt(value);
-  return result;
-}
+
+  /// One step that lowers the value. False where none does, or it hardly moves.
+  bool step(std::vector<double>& q, double& value, double& damping) {
+    expand(q);
+    for (; damping < 1e12; damping *= 10.0) {
+      Eigen::MatrixXd damped = hessian_;
+      damped.diagonal() += damping * (gauss_.diagonal().array() + 1e-12 * (1.0 + gauss_.trace())).matrix();
+      const auto solved = solve_positive_definite(damped, gradient_);
+      if (!solved) continue;
+      std::vector<double> next = q;
+      for (std::size_t a = 0; a < q.size(); ++a) {
+        const auto i = static_cast<Eigen::Index>(a);
+        next[a] -= std::clamp((*solved)[i], -1.0, 1.0) * unit_[i];
+      }
+      clamp(next);
+      const double trial = squared_distance(next);
+      if (!(trial < value)) continue;
+      const bool moved = (value - trial) > 1e-17 * (1e-6 + value) || solved->cwiseAbs().maxCoeff() > 1e-9;
+      value = trial;
+      q = next;
+      damping = std::max(damping * 0.1, 1e-15);
+      return moved;
+    }
+    return false;
+  }
+
+  const Manifold& f_;
+  const Eigen::VectorXd& point_;
+  Eigen::VectorXd unit_;
+  Eigen::VectorXd gradient_;
+  Eigen::MatrixXd gauss_;
+  Eigen::MatrixXd hessian_;
+  Eigen::VectorXd second_;
+};
 
 }  // namespace
 
@@ -163,57 +185,61 @@ ExhaustiveSearch::ExhaustiveSearch(std::span<const Manifold> manifolds) : Manifo
     Scan scan;
     const auto axes = active_axes(manifold);
     scan.closed_form = axes.size() == 1 && manifold.bases()[axes[0]].degree() <= 2;
-    if (scan.closed_form) {
-      const AxisBasis& basis = manifold.bases()[axes[0]];
-      const auto segments = static_cast<Eigen::Index>(basis.segments());
-      scan.terms.resize(manifold.dimensions(), 3 * segments);
-      for (std::size_t s = 0; s < basis.segments(); ++s) {
-        const double begin = basis.begin(s);
-        const double width = basis.end(s) - begin;
-        scan.starts.push_back(begin);
-        scan.starts.push_back(width);
-        // A quadratic is known from three inner points, whatever basis wrote it.
-        Eigen::VectorXd value[3];
-        for (int i = 0; i < 3; ++i) {
-          std::vector<double> q(manifold.dofs(), 0.0);
-          q[axes[0]] = begin + width * (0.25 + 0.25 * i);
-          value[i] = manifold.evaluate(q);
-        }
-        const auto column = static_cast<Eigen::Index>(3 * s);
-        scan.terms.col(column) = 3.0 * value[0] - 3.0 * value[1] + value[2];
-        scan.terms.col(column + 1) = -10.0 * value[0] + 16.0 * value[1] - 6.0 * value[2];
-        scan.terms.col(column + 2) = 8.0 * (value[0] - 2.0 * value[1] + value[2]);
-      }
-    } else {
-      const int per_axis = samples_per_axis[axes.size()];
-      std::size_t patches = 1;
-      std::size_t inside = 1;
-      for (const AxisBasis& basis : manifold.bases()) patches *= basis.segments();
-      for (std::size_t a = 0; a < axes.size(); ++a) inside *= static_cast<std::size_t>(per_axis);
-      scan.samples.resize(manifold.dimensions(), static_cast<Eigen::Index>(patches * inside));
-      for (std::size_t patch = 0; patch < patches; ++patch)
-        for (std::size_t sample = 0; sample < inside; ++sample) {
-          std::vector<double> q(manifold.dofs());
-          std::size_t rest_patch = patch;
-          std::size_t rest = sample;
-          for (std::size_t a = manifold.dofs(); a-- > 0;) {
-            const AxisBasis& basis = manifold.bases()[a];
-            const std::size_t segment = rest_patch % basis.segments();
-            rest_patch /= basis.segments();
-            double u = 0.0;
-            if (basis.degree() > 0) {
-              u = (static_cast<double>(rest % static_cast<std::size_t>(per_axis)) + 0.5) / per_axis;
-              rest /= static_cast<std::size_t>(per_axis);
-            }
-            q[a] = basis.position({segment, u});
-          }
-          scan.samples.col(static_cast<Eigen::Index>(scan.patch.size())) = manifold.evaluate(q);
-          scan.patch.push_back(patch);
-          scan.q.insert(scan.q.end(), q.begin(), q.end());
-        }
-    }
+    if (scan.closed_form)
+      cut_segments(manifold, axes[0], scan);
+    else
+      cut_samples(manifold, axes.size(), scan);
     scans_.push_back(std::move(scan));
   }
+}
+
+void ExhaustiveSearch::cut_segments(const Manifold& manifold, std::size_t axis, Scan& scan) {
+  const AxisBasis& basis = manifold.bases()[axis];
+  scan.terms.resize(manifold.dimensions(), 3 * static_cast<Eigen::Index>(basis.segments()));
+  for (std::size_t s = 0; s < basis.segments(); ++s) {
+    const double begin = basis.begin(s);
+    const double width = basis.end(s) - begin;
+    scan.starts.push_back(begin);
+    scan.starts.push_back(width);
+    // A quadratic is known from three inner points, whatever basis wrote it.
+    Eigen::VectorXd value[3];
+    for (int i = 0; i < 3; ++i) {
+      std::vector<double> q(manifold.dofs(), 0.0);
+      q[axis] = begin + width * (0.25 + 0.25 * i);
+      value[i] = manifold.evaluate(q);
+    }
+    const auto column = static_cast<Eigen::Index>(3 * s);
+    scan.terms.col(column) = 3.0 * value[0] - 3.0 * value[1] + value[2];
+    scan.terms.col(column + 1) = -10.0 * value[0] + 16.0 * value[1] - 6.0 * value[2];
+    scan.terms.col(column + 2) = 8.0 * (value[0] - 2.0 * value[1] + value[2]);
+  }
+}
+
+void ExhaustiveSearch::cut_samples(const Manifold& manifold, std::size_t active_axes, Scan& scan) {
+  const auto per_axis = static_cast<std::size_t>(samples_per_axis[active_axes]);
+  std::vector<std::size_t> segments;
+  std::vector<std::size_t> within;
+  for (const AxisBasis& basis : manifold.bases()) {
+    segments.push_back(basis.segments());
+    within.push_back(basis.degree() > 0 ? per_axis : 1);
+  }
+  const Grid patches(segments);
+  const Grid inside(within);
+  scan.samples.resize(manifold.dimensions(), static_cast<Eigen::Index>(patches.size() * inside.size()));
+  std::vector<double> q(manifold.dofs());
+  for (std::size_t patch = 0; patch < patches.size(); ++patch)
+    for (std::size_t sample = 0; sample < inside.size(); ++sample) {
+      for (std::size_t a = 0; a < manifold.dofs(); ++a) {
+        const AxisBasis& basis = manifold.bases()[a];
+        const double u = basis.degree() > 0 ? (static_cast<double>(inside.index(sample, a)) + 0.5) /
+                                                  static_cast<double>(per_axis)
+                                            : 0.0;
+        q[a] = basis.position({patches.index(patch, a), u});
+      }
+      scan.samples.col(static_cast<Eigen::Index>(scan.patch.size())) = manifold.evaluate(q);
+      scan.patch.push_back(patch);
+      scan.q.insert(scan.q.end(), q.begin(), q.end());
+    }
 }
 
 ClosestPoint ExhaustiveSearch::closest_by_roots(std::size_t manifold, const Eigen::VectorXd& point) const {
@@ -282,7 +308,8 @@ ClosestPoint ExhaustiveSearch::closest_by_samples(std::size_t manifold, const Ei
   best.distance = std::numeric_limits<double>::infinity();
   for (const auto& [squared, sample] : order) {
     const auto first = scan.q.begin() + static_cast<std::ptrdiff_t>(sample * f.dofs());
-    const ClosestPoint found = descend(f, point, {first, first + static_cast<std::ptrdiff_t>(f.dofs())});
+    const ClosestPoint found =
+        NewtonDescent(f, point).from({first, first + static_cast<std::ptrdiff_t>(f.dofs())});
     if (found.distance < best.distance) best = found;
   }
   best.manifold = manifold;
