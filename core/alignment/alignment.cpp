@@ -7,6 +7,7 @@
 
 #include <Eigen/LU>
 
+#include "core/base/insertion_sort.h"
 #include "core/manifold/pose_covariance.h"
 #include "core/simd/dense_kernels.h"
 
@@ -28,23 +29,13 @@ Misalignment as_misalignment(const Vector5& v) {
   return {v(0), v(1), v(2), v(3), v(4)};
 }
 
-/// Index of the sample that is `steps` away from `t` along axis `a`, or −1 beyond an open end.
-std::ptrdiff_t neighbour(const AlignmentEigenspace& space, std::size_t t, std::size_t a, int steps) {
-  const auto& counts = space.sample_counts();
-  std::size_t stride = 1;
-  for (std::size_t i = counts.size(); i-- > a + 1;) {
-    stride *= static_cast<std::size_t>(counts[i]);
-  }
-  const int count = counts[a];
-  const int here = static_cast<int>(t / stride % static_cast<std::size_t>(count));
-  int there = here + steps;
-  if (space.coarse_manifold().axes()[a].dof.periodic) {
-    there = ((there % count) + count) % count;
-  } else if (there < 0 || there >= count) {
-    return -1;
-  }
-  return static_cast<std::ptrdiff_t>(t) +
-         static_cast<std::ptrdiff_t>(there - here) * static_cast<std::ptrdiff_t>(stride);
+/// Two poses that differ by less than this share of every DOF's range are the same.
+constexpr double same_pose = 0.01;
+
+bool same(std::span<const SampleAxis> axes, const PoseVector& a, const PoseVector& b) {
+  for (std::size_t d = 0; d < axes.size(); ++d)
+    if (std::fabs(axes[d].dof.difference(a[d], b[d])) > same_pose * axes[d].dof.period()) return false;
+  return true;
 }
 
 }  // namespace
@@ -112,83 +103,94 @@ double PoseAligner::cost_at(const float* point, Vector5* x) const {
   return static_cast<double>(squared) + prior_cost_ - b.dot(best);
 }
 
-void PoseAligner::follow(const PosePicture& picture, const AlignmentEigenspace& space, std::size_t start,
-                         AlignedPose& end) {
-  const auto& counts = space.sample_counts();
-  std::size_t here = start;
-  Misalignment p;
-  Vector5 x;
-  double best = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < options_.rounds; ++round) {
-    if (round == 0) {
-      projected_ = unmoved_;
-      dimensions_ = space.coarse().basis.cols();
-      inverse_ = unmoved_inverse_;
-      set_prior(p);
-    } else if (round < tangent_rounds) {
-      project(space, space.coarse(), picture, p);
-    } else {
-      project_picture(space, picture, p);
-    }
-    // Coordinate-wise descent over the grid within reach: exact for one DOF.
-    std::size_t found = here;
-    double lowest = cost_at(space.samples().col(static_cast<Eigen::Index>(here)).data(), nullptr);
-    for (std::size_t a = 0; a < counts.size(); ++a) {
-      const int reach = std::max(1, static_cast<int>(std::lround(options_.reach * counts[a])));
-      const std::size_t centre = found;
-      for (int s = -reach; s <= reach; ++s) {
-        const std::ptrdiff_t t = neighbour(space, centre, a, s);
-        if (t < 0) {
-          continue;
-        }
-        const double cost = cost_at(space.samples().col(t).data(), nullptr);
-        if (cost < lowest) {
-          lowest = cost;
-          found = static_cast<std::size_t>(t);
-        }
+void PoseAligner::begin_round(const PosePicture& picture, const AlignmentEigenspace& space, int round,
+                              const Misalignment& p) {
+  if (round == 0) {
+    projected_ = unmoved_;
+    dimensions_ = space.coarse().basis.cols();
+    inverse_ = unmoved_inverse_;
+    set_prior(p);
+  } else if (round < tangent_rounds) {
+    project(space, space.coarse(), picture, p);
+  } else {
+    project_picture(space, picture, p);
+  }
+}
+
+std::size_t PoseAligner::best_within_reach(const AlignmentEigenspace& space, std::size_t here,
+                                           double& lowest) const {
+  const Grid& grid = space.sample_grid();
+  std::size_t found = here;
+  lowest = cost_at(space.sample(here), nullptr);
+  for (std::size_t a = 0; a < grid.axes(); ++a) {
+    const long reach = std::max(1L, std::lround(options_.reach * static_cast<double>(grid.count(a))));
+    const std::size_t centre = found;
+    for (long s = -reach; s <= reach; ++s) {
+      const auto t = grid.neighbour(centre, a, s, space.ends(a));
+      if (!t) continue;
+      const double cost = cost_at(space.sample(*t), nullptr);
+      if (cost < lowest) {
+        lowest = cost;
+        found = *t;
       }
     }
-    cost_at(space.samples().col(static_cast<Eigen::Index>(found)).data(), &x);
+  }
+  return found;
+}
+
+AlignedPose PoseAligner::follow(const PosePicture& picture, const AlignmentEigenspace& space,
+                                std::size_t start) {
+  AlignedPose end;
+  std::size_t here = start;
+  Misalignment p;
+  double best = std::numeric_limits<double>::infinity();
+  const Vector5 limit = 4.0 * precision_.cwiseInverse().cwiseSqrt();
+  for (int round = 0; round < options_.rounds; ++round) {
+    begin_round(picture, space, round, p);
+    double lowest = 0.0;
+    const std::size_t found = best_within_reach(space, here, lowest);
+    Vector5 x;
+    cost_at(space.sample(found), &x);
     const bool settled = found == here && round > 0 && lowest > best - 3e-2 * options_.noise - 3e-2 * best;
     here = found;
     best = lowest;
-    Vector5 moved = as_vector(p) + x;
-    const Vector5 limit = 4.0 * precision_.cwiseInverse().cwiseSqrt();
-    moved = moved.cwiseMax(-limit).cwiseMin(limit);
-    if (settled || round + 1 == options_.rounds) {
-      end.misalignment = as_misalignment(moved);
-      break;
-    }
-    p = as_misalignment(moved);
+    p = as_misalignment((as_vector(p) + x).cwiseMax(-limit).cwiseMin(limit));
+    if (settled) break;
   }
+  end.misalignment = p;
   end.cost = best;
   end.fine_cost = best;
-  const auto dofs = static_cast<std::size_t>(space.sample_poses().rows());
-  end.q.resize(dofs);
-  end.q_covariance.resize(dofs * dofs);
-  set_unseen(dofs, end.q_covariance);
-  const double variance = std::max(best, options_.noise) / static_cast<double>(dimensions_);
+  interpolate(space, here, end);
+  return end;
+}
+
+void PoseAligner::interpolate(const AlignmentEigenspace& space, std::size_t sample, AlignedPose& pose) const {
+  const Grid& grid = space.sample_grid();
+  const std::size_t dofs = grid.axes();
+  pose.q.resize(dofs);
+  pose.q_covariance.resize(dofs * dofs);
+  set_unseen(dofs, pose.q_covariance);
+  const double variance = std::max(pose.cost, options_.noise) / static_cast<double>(dimensions_);
   for (std::size_t a = 0; a < dofs; ++a) {
-    const double q = space.sample_poses()(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(here));
-    end.q[a] = q;
-    const std::ptrdiff_t before = neighbour(space, here, a, -1);
-    const std::ptrdiff_t after = neighbour(space, here, a, 1);
-    if (counts[a] < 3 || before < 0 || after < 0) {
-      continue;
-    }
-    const double left = cost_at(space.samples().col(before).data(), nullptr);
-    const double right = cost_at(space.samples().col(after).data(), nullptr);
-    const double curvature = left - 2.0 * best + right;
+    const auto pose_of = [&](std::size_t t) {
+      return space.sample_poses()(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(t));
+    };
+    pose.q[a] = pose_of(sample);
+    const auto before = grid.neighbour(sample, a, -1, space.ends(a));
+    const auto after = grid.neighbour(sample, a, 1, space.ends(a));
+    if (grid.count(a) < 3 || !before || !after) continue;
+    const double left = cost_at(space.sample(*before), nullptr);
+    const double right = cost_at(space.sample(*after), nullptr);
+    const double curvature = left - 2.0 * pose.cost + right;
     const Dof& dof = space.coarse_manifold().axes()[a].dof;
-    const double step = dof.difference(space.sample_poses()(static_cast<Eigen::Index>(a), after), q);
+    const double step = dof.difference(pose_of(*after), pose.q[a]);
     if (curvature > 0.0) {
-      end.q[a] = dof.canonical(q + step * std::clamp(0.5 * (left - right) / curvature, -1.0, 1.0));
-      // The cost is a squared distance whose expected value at the truth is D·variance; ½·curvature = 1/σ² ·
-      // variance.
-      end.q_covariance[a * dofs + a] = step * step * 2.0 * variance / curvature;
+      pose.q[a] = dof.canonical(pose.q[a] + step * std::clamp(0.5 * (left - right) / curvature, -1.0, 1.0));
+      // At the truth the squared distance has the expected value D·variance, and ½·curvature = variance/σ².
+      pose.q_covariance[a * dofs + a] = step * step * 2.0 * variance / curvature;
     }
   }
-  if (dofs > 1) relate(space, variance, end);
+  if (dofs > 1) relate(space, variance, pose);
 }
 
 void PoseAligner::relate(const AlignmentEigenspace& space, double variance, AlignedPose& pose) const {
@@ -201,18 +203,55 @@ void PoseAligner::relate(const AlignmentEigenspace& space, double variance, Alig
 
 double PoseAligner::fine_cost(const PosePicture& picture, const AlignmentEigenspace& space,
                               const AlignedPose& pose) {
+  constexpr int steps = 5;
   project(space, space.fine(), picture, pose.misalignment);
-  const Dof& dof = space.fine_manifold().axes()[0].dof;
-  double lowest = std::numeric_limits<double>::infinity();
-  PoseNumbers q = pose.q;
-  const double step = dof.period() / 360.0;
-  for (int s = -5; s <= 5; ++s) {
-    q[0] = pose.q[0] + s * step;
+  const auto axes = space.fine_manifold().axes();
+  const auto cost_of = [&](const PoseVector& q) {
     space.fine_manifold().evaluate_into(q, fine_point_);
-    fine_numbers_.assign(fine_point_.begin(), fine_point_.end());
-    lowest = std::min(lowest, cost_at(fine_numbers_.data(), nullptr));
+    fine_coordinates_.assign(fine_point_.begin(), fine_point_.end());
+    return cost_at(fine_coordinates_.data(), nullptr);
+  };
+  PoseVector best = pose.q;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (std::size_t a = 0; a < axes.size(); ++a) {
+    if (a > 0 && axes[a].samples.size() < 2) continue;
+    const double step = axes[a].dof.period() / 360.0;
+    PoseVector q = best;
+    const double centre = q[a];
+    for (int s = -steps; s <= steps; ++s) {
+      q[a] = centre + s * step;
+      const double cost = cost_of(q);
+      if (cost >= lowest) continue;
+      lowest = cost;
+      best = q;
+    }
   }
   return lowest;
+}
+
+void PoseAligner::find_minima(const AlignmentEigenspace& space) {
+  const Grid& grid = space.sample_grid();
+  minima_.clear();
+  for (std::size_t t = 0; t < grid.size(); ++t) {
+    bool lowest = true;
+    for (std::size_t a = 0; a < grid.axes() && lowest; ++a)
+      for (const int s : {-1, 1}) {
+        const auto n = grid.neighbour(t, a, s, space.ends(a));
+        lowest = lowest && (!n || costs_[t] <= costs_[*n]);
+      }
+    if (lowest) minima_.push_back(t);
+  }
+}
+
+void PoseAligner::compare_fine(const PosePicture& picture, const AlignmentEigenspace& space) {
+  insertion_sort(poses_, [](const AlignedPose& a, const AlignedPose& b) { return a.cost < b.cost; });
+  AlignedPose& best = poses_.front();
+  best.fine_cost = fine_cost(picture, space, best);
+  const double finer = best.fine_cost - best.cost;
+  for (AlignedPose& pose : std::span(poses_).subspan(1)) {
+    const bool close = pose.cost < best.cost + options_.close * options_.noise;
+    pose.fine_cost = close ? fine_cost(picture, space, pose) : pose.cost + finer;
+  }
 }
 
 const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture,
@@ -220,59 +259,24 @@ const std::vector<AlignedPose>& PoseAligner::align(const PosePicture& picture,
   project(space, space.coarse(), picture, {});
   unmoved_ = projected_;
   unmoved_inverse_ = inverse_;
-  const auto total = static_cast<std::size_t>(space.samples().cols());
-  costs_.resize(total);
-  for (std::size_t t = 0; t < total; ++t) {
-    costs_[t] = cost_at(space.samples().col(static_cast<Eigen::Index>(t)).data(), nullptr);
-  }
-  minima_.clear();
-  for (std::size_t t = 0; t < total; ++t) {
-    bool lowest = true;
-    for (std::size_t a = 0; a < space.sample_counts().size() && lowest; ++a) {
-      for (const int s : {-1, 1}) {
-        const std::ptrdiff_t n = neighbour(space, t, a, s);
-        lowest = lowest && (n < 0 || costs_[t] <= costs_[static_cast<std::size_t>(n)]);
-      }
-    }
-    if (lowest) {
-      minima_.push_back(t);
-    }
-  }
+  costs_.resize(space.sample_grid().size());
+  for (std::size_t t = 0; t < costs_.size(); ++t) costs_[t] = cost_at(space.sample(t), nullptr);
+  find_minima(space);
   const auto starts = std::min(minima_.size(), options_.starts);
   std::partial_sort(minima_.begin(), minima_.begin() + static_cast<std::ptrdiff_t>(starts), minima_.end(),
                     [this](std::size_t a, std::size_t b) { return costs_[a] < costs_[b]; });
   poses_.clear();
   for (std::size_t i = 0; i < starts; ++i) {
-    // What begins this much worse does not end best.
-    if (costs_[minima_[i]] > 2.0 * costs_[minima_[0]] + options_.hopeless * options_.noise) {
-      break;
-    }
-    AlignedPose pose;
-    follow(picture, space, minima_[i], pose);
+    if (costs_[minima_[i]] > 2.0 * costs_[minima_[0]] + options_.hopeless * options_.noise) break;
+    const AlignedPose pose = follow(picture, space, minima_[i]);
     const bool known = std::any_of(poses_.begin(), poses_.end(), [&](const AlignedPose& other) {
-      const auto axes = space.coarse_manifold().axes();
-      for (std::size_t a = 0; a < axes.size(); ++a) {
-        if (std::fabs(axes[a].dof.difference(pose.q[a], other.q[a])) > 0.01 * axes[a].dof.period()) {
-          return false;
-        }
-      }
-      return true;
+      return same(space.coarse_manifold().axes(), pose.q, other.q);
     });
-    if (!known) {
-      poses_.push_back(pose);
-    }
+    if (!known) poses_.push_back(pose);
   }
-  if (options_.fine && poses_.size() > 1) {
-    sort_few(poses_, [](const AlignedPose& a, const AlignedPose& b) { return a.cost < b.cost; });
-    AlignedPose& best = poses_.front();
-    best.fine_cost = fine_cost(picture, space, best);
-    const double finer = best.fine_cost - best.cost;
-    for (AlignedPose& pose : std::span(poses_).subspan(1)) {
-      const bool close = pose.cost < best.cost + options_.close * options_.noise;
-      pose.fine_cost = close ? fine_cost(picture, space, pose) : pose.cost + finer;
-    }
-  }
-  sort_few(poses_, [](const AlignedPose& a, const AlignedPose& b) { return a.fine_cost < b.fine_cost; });
+  if (options_.fine && poses_.size() > 1) compare_fine(picture, space);
+  insertion_sort(poses_,
+                 [](const AlignedPose& a, const AlignedPose& b) { return a.fine_cost < b.fine_cost; });
   return poses_;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <emmintrin.h>
 #include <opencv2/imgproc.hpp>
@@ -130,6 +131,25 @@ void span_of(const Eigen::MatrixXf& pictures, int side, PoseScale& scale, Eigen:
   points = scale.basis.cast<double>().transpose() * centred;
 }
 
+/// Where the samples of an axis lie. Several between neighbouring views, as many as `room` allows for each,
+/// but at most 360 an axis, or one a view where there are more views: 1° on a turntable.
+std::vector<double> sample_places(const SampleAxis& axis, double room) {
+  constexpr std::size_t most_an_axis = 360;
+  const std::size_t views = axis.samples.size();
+  if (views < 2) return {axis.samples.front()};
+  const auto wanted = static_cast<std::size_t>(static_cast<double>(views) * room);
+  const std::size_t count = std::max(views, std::min(wanted, most_an_axis));
+  const bool closed = axis.dof.periodic;
+  const double first = closed ? axis.dof.lower : axis.samples.front();
+  const double range = closed ? axis.dof.period() : axis.samples.back() - axis.samples.front();
+  std::vector<double> places;
+  places.reserve(count);
+  for (std::size_t i = 0; i < count; ++i)
+    places.push_back(first +
+                     range * static_cast<double>(i) / static_cast<double>(closed ? count : count - 1));
+  return places;
+}
+
 }  // namespace
 
 void make_pose_picture(const cv::Mat& picture, PosePicture& out) {
@@ -210,7 +230,8 @@ AlignmentEigenspace AlignmentEigenspace::learn(const std::vector<SampleAxis>& ax
                                                const std::vector<PosePicture>& views,
                                                const Eigen::MatrixXd& poses) {
   if (views.size() < 2) {
-    throw std::invalid_argument("a pose space needs at least 2 views, got " + std::to_string(views.size()));
+    throw std::invalid_argument("an alignment eigenspace needs at least 2 views, got " +
+                                std::to_string(views.size()));
   }
   AlignmentEigenspace space;
   Eigen::MatrixXd points;
@@ -255,7 +276,7 @@ AlignmentEigenspace AlignmentEigenspace::from_parts(PoseScale coarse, PoseScale 
   };
   if (coarse.side != coarse_side || fine.side > PosePicture::side || !fits(coarse, coarse_manifold) ||
       !fits(fine, fine_manifold) || pixel_mean.size() != coarse.basis.rows()) {
-    throw std::invalid_argument("has a pose space whose parts do not fit together");
+    throw std::invalid_argument("has an alignment eigenspace whose parts do not fit together");
   }
   AlignmentEigenspace space;
   space.coarse_ = std::move(coarse);
@@ -269,47 +290,25 @@ AlignmentEigenspace AlignmentEigenspace::from_parts(PoseScale coarse, PoseScale 
 
 void AlignmentEigenspace::make_samples() {
   const auto axes = coarse_manifold_->axes();
-  std::size_t total = 1;
-  sample_counts_.clear();
-  for (const SampleAxis& axis : axes) {
-    total *= axis.samples.size();
-  }
-  // Between neighbouring views several samples an axis, as many as the limit allows; one DOF gets 1° on a
-  // turntable.
-  const double room = std::pow(static_cast<double>(most_samples) / static_cast<double>(total),
+  const double room = std::pow(static_cast<double>(most_samples) / static_cast<double>(grid_of(axes).size()),
                                1.0 / static_cast<double>(axes.size()));
-  std::vector<std::vector<double>> values;
-  total = 1;
+  std::vector<std::vector<double>> places;
+  std::vector<std::size_t> counts;
   for (const SampleAxis& axis : axes) {
-    const auto views = axis.samples.size();
-    int count = 1;
-    if (views > 1) {
-      count = std::clamp(static_cast<int>(static_cast<double>(views) * room), static_cast<int>(views), 360);
-    }
-    const bool closed = axis.dof.periodic && views > 1;
-    std::vector<double> places;
-    places.reserve(static_cast<std::size_t>(count));
-    const double first = closed ? axis.dof.lower : axis.samples.front();
-    const double range = closed ? axis.dof.period() : axis.samples.back() - axis.samples.front();
-    for (int i = 0; i < count; ++i) {
-      places.push_back(count == 1 ? first : first + range * i / (closed ? count : count - 1));
-    }
-    sample_counts_.push_back(count);
-    total *= static_cast<std::size_t>(count);
-    values.push_back(std::move(places));
+    places.push_back(sample_places(axis, room));
+    counts.push_back(places.back().size());
   }
-  sample_poses_.resize(static_cast<Eigen::Index>(axes.size()), static_cast<Eigen::Index>(total));
-  samples_.resize(coarse_manifold_->dimensions(), static_cast<Eigen::Index>(total));
+  sample_grid_ = Grid(std::move(counts));
+  const auto total = static_cast<Eigen::Index>(sample_grid_.size());
+  sample_poses_.resize(static_cast<Eigen::Index>(axes.size()), total);
+  samples_.resize(coarse_manifold_->dimensions(), total);
   std::vector<double> q(axes.size());
-  for (std::size_t t = 0; t < total; ++t) {
-    std::size_t rest = t;
-    for (std::size_t a = axes.size(); a-- > 0;) {
-      q[a] = values[a][rest % values[a].size()];
-      rest /= values[a].size();
-    }
-    sample_poses_.col(static_cast<Eigen::Index>(t)) =
+  for (std::size_t t = 0; t < sample_grid_.size(); ++t) {
+    for (std::size_t a = 0; a < axes.size(); ++a) q[a] = places[a][sample_grid_.index(t, a)];
+    const auto column = static_cast<Eigen::Index>(t);
+    sample_poses_.col(column) =
         Eigen::Map<const Eigen::VectorXd>(q.data(), static_cast<Eigen::Index>(q.size()));
-    samples_.col(static_cast<Eigen::Index>(t)) = coarse_manifold_->evaluate(q).cast<float>();
+    samples_.col(column) = coarse_manifold_->evaluate(q).cast<float>();
   }
 }
 

@@ -1,9 +1,10 @@
 #pragma once
 
-/// The eigenspace and manifold of one object's brightness, for finding its pose once it is known.
+/// The alignment eigenspace: eigenspace and manifold of one object's brightness, for finding pose and
+/// misalignment of a known object.
 ///
 /// Appearances are grey, of unit energy and blurred, at two scales. All dimensions that the views span are
-/// kept, so that a point of the manifold is exactly the interpolated view.
+/// kept, so that a point of the manifold is the interpolated view itself.
 
 #include <optional>
 #include <span>
@@ -13,7 +14,9 @@
 #include <opencv2/core.hpp>
 
 #include "core/alignment/misalignment.h"
+#include "core/base/grid.h"
 #include "core/manifold/manifold.h"
+#include "core/manifold/sample_grid.h"
 
 namespace eigenpose {
 
@@ -28,7 +31,7 @@ struct PosePicture {
 /// Makes `out` from a square CV_8UC1 or CV_8UC3 picture of any size.
 void make_pose_picture(const cv::Mat& picture, PosePicture& out);
 
-/// One scale of a pose space.
+/// One scale of an alignment eigenspace.
 struct PoseScale {
   int side = 0;           ///< pixels a side: 32 (coarse) or 48 (fine)
   Eigen::MatrixXf basis;  ///< side² × D
@@ -67,7 +70,12 @@ class AlignmentEigenspace {
   /// Grid of manifold samples: poses (m × T) and coarse points (D × T), last DOF fastest.
   [[nodiscard]] const Eigen::MatrixXd& sample_poses() const { return sample_poses_; }
   [[nodiscard]] const Eigen::MatrixXf& samples() const { return samples_; }
-  [[nodiscard]] const std::vector<int>& sample_counts() const { return sample_counts_; }
+  [[nodiscard]] const float* sample(std::size_t t) const {
+    return samples_.col(static_cast<Eigen::Index>(t)).data();
+  }
+  [[nodiscard]] const Grid& sample_grid() const { return sample_grid_; }
+  /// Whether the samples along a DOF close on themselves.
+  [[nodiscard]] Grid::Ends ends(std::size_t dof) const { return ends_of(coarse_manifold_->axes()[dof]); }
   /// Squared error of the spline at each learned view when that view is left out (coarse scale).
   [[nodiscard]] const std::vector<double>& left_out_errors() const { return left_out_errors_; }
   [[nodiscard]] std::size_t memory() const;
@@ -82,7 +90,7 @@ class AlignmentEigenspace {
   std::optional<Manifold> fine_manifold_;
   Eigen::MatrixXd sample_poses_;
   Eigen::MatrixXf samples_;
-  std::vector<int> sample_counts_;
+  Grid sample_grid_;
   std::vector<double> left_out_errors_;
 };
 

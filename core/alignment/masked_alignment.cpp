@@ -2,30 +2,31 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <stdexcept>
 
 #include <Eigen/LU>
 
+#include "core/base/statistics.h"
 #include "core/manifold/pose_covariance.h"
 #include "core/simd/dense_kernels.h"
 
 namespace eigenpose {
 namespace {
 
-constexpr double free_gain = 1.0;   // a cover changes the energy: 1 σ of the gain
-constexpr int trusting_rounds = 2;  // weighted by what the windows trust
-constexpr int robust_rounds = 3;    // weighted by what the pose leaves unexplained
+constexpr double free_gain = 1.0;   // an occluder changes the energy: 1 σ of the gain
+constexpr int trusting_rounds = 2;  // weighted by trust
+constexpr int robust_rounds = 3;    // weighted by residual
 constexpr int steps = 15;           // samples each way within the reach
 /// A pixel's variance, as a multiple of the noise that the splines leave spread over all pixels.
 constexpr double variance_of_pixels = 6.0;
 constexpr double robust_width = 3.0;      // σ at which a pixel's weight is a quarter
 constexpr double most_unexplained = 4.5;  // ½·3²
-/// Darker pixels say nothing of how well a pose fits: a third of a region's root mean square, 1/32.
+/// Darker pixels do not enter the median residual: a third of a region's root mean square, 1/32.
 constexpr float dark = 0.01F;
 constexpr float trusted = 0.2F;
 constexpr double deviation_of_median = 1.4826;  // σ over the median of |r|, for normal r
 
-/// Between the poses that a round looks at, as a share of a DOF's range: half as far every round.
+/// Step between the poses that a round compares, as a share of a DOF's range; it halves every round.
 double step_of_round(int round, double reach) {
   const double least = 0.5 / 360.0;
   const double step = reach / (steps * (1 << round));
@@ -65,9 +66,7 @@ void MaskedAligner::weigh_by_residual() {
   }
   double variance = pixel_variance_;
   if (residuals_.size() > 20) {
-    const auto middle = residuals_.begin() + static_cast<std::ptrdiff_t>(residuals_.size() / 2);
-    std::nth_element(residuals_.begin(), middle, residuals_.end());
-    const double sigma = deviation_of_median * static_cast<double>(*middle);
+    const double sigma = deviation_of_median * static_cast<double>(upper_median(residuals_));
     variance = std::max(variance, sigma * sigma);
   }
   const auto scale = static_cast<float>(1.0 / (robust_width * robust_width * variance));
@@ -130,7 +129,7 @@ double MaskedAligner::cost_at(std::span<const double> q, Vector5* x) {
 void MaskedAligner::move(MaskedPose& masked, double step_share) {
   AlignedPose& pose = masked.aligned;
   const auto axes = space_->coarse_manifold().axes();
-  PoseNumbers q = pose.q;
+  PoseVector q = pose.q;
   double lowest = cost_at(q, nullptr);
   for (std::size_t a = 0; a < axes.size(); ++a) {
     if (axes[a].samples.size() < 2) continue;
@@ -180,6 +179,7 @@ void MaskedAligner::relate(AlignedPose& pose) const {
 }
 
 MaskedPose MaskedAligner::approach(std::span<const double> start, double reach) {
+  if (picture_ == nullptr) throw std::logic_error("approach() needs a region: call look() first");
   MaskedPose masked;
   AlignedPose& pose = masked.aligned;
   pose.q.resize(start.size());
@@ -207,6 +207,7 @@ MaskedPose MaskedAligner::approach(std::span<const double> start, double reach) 
 }
 
 void MaskedAligner::refine(MaskedPose& masked, double reach) {
+  if (picture_ == nullptr) throw std::logic_error("refine() needs a region: call look() first");
   AlignedPose& pose = masked.aligned;
   const PoseScale& scale = space_->coarse();
   for (int round = trusting_rounds; round < trusting_rounds + robust_rounds; ++round) {

@@ -1,13 +1,15 @@
 #pragma once
 
-/// Alignment on the pixels that are to be seen, for objects that are partly covered (gappy projection, with
-/// robust weights).
+/// Alignment on the visible pixels, for partly occluded objects (gappy projection of Everson and Sirovich,
+/// with robust weights).
 ///
-/// Under a cover the energy of a region is wrong, and so are its projections. Here the manifold's point is
-/// compared with the region pixel by pixel, with gain and misalignment as free unknowns. The first rounds
-/// weigh a pixel by how far the windows around it trust it; the later ones by how well the pose found so far
-/// explains it (iterated least squares with Geman and McClure's weights), so that the cover's outline is
-/// found to the pixel.
+/// An occluder changes the energy of a region, and all its projections. Here the manifold's point is compared
+/// with the region pixel by pixel, with gain and misalignment as free unknowns:
+///
+///     c(q) = Σᵢ wᵢ (Mᵢ(q) − fᵢ − (Jx)ᵢ)² + ν(p + x)ᵀΛ(p + x).
+///
+/// In the first rounds wᵢ is the trust of the windows around pixel i; in the later ones the weight of Geman
+/// and McClure of its residual r, (1 + r²/(3σ)²)⁻², so that the occluder's outline is found to the pixel.
 
 #include <span>
 #include <vector>
@@ -16,27 +18,28 @@
 
 namespace eigenpose {
 
-/// A pose of a partly covered object.
+/// A pose of a partly occluded object.
 struct MaskedPose {
   AlignedPose aligned;      ///< its cost is over the visible pixels
-  double first_gain = 0.0;  ///< what makes the trusted pixels at the start as bright as the object's, minus 1
-  /// What all pixels hold against the pose, in units of half a squared sigma of a pixel's noise; a pixel that
-  /// is not explained at all counts no more than one that is 3 σ off, so covers cost every pose the same.
+  double first_gain = 0.0;  ///< ratio of the object's to the trusted pixels' brightness at the start, minus 1
+  /// Σᵢ min(rᵢ²/2σ², ½·3²) over all pixels, σ² a pixel's noise: an occluded pixel counts as one that is 3 σ
+  /// off, so that an occluder costs every pose the same.
   double unexplained = 0.0;
 };
 
-/// Aligns one covered region after the other. Holds scratch memory: one thread at a time.
+/// Aligns one occluded region after the other. Holds scratch memory: one thread at a time.
 class MaskedAligner {
  public:
   explicit MaskedAligner(const AlignmentOptions& options);
 
-  /// The region and the object that the others are about. Both must stay until the last call of them.
-  /// @param trust 32×32 numbers 0…1, row by row.
+  /// Sets the region and the object for `approach` and `refine`. All three must stay until their last call.
+  /// @param trust 32×32 weights 0…1, row by row.
   void look(const PosePicture& picture, const AlignmentEigenspace& space, std::span<const float> trust);
-  /// The first rounds from a pose, on the coarse scale, by what the windows trust. Cheap beside `refine`.
+  /// The first rounds from a pose, weighted by trust. Cheap beside `refine`. @throws std::logic_error before
+  /// `look`.
   /// @param reach how far a round may move the pose, as a share of each DOF's range.
   MaskedPose approach(std::span<const double> start, double reach);
-  /// The later rounds, by what the pose explains.
+  /// The later rounds, weighted by residual. @throws std::logic_error before `look`.
   /// @param reach as given to `approach`.
   void refine(MaskedPose& pose, double reach);
 

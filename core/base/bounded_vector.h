@@ -1,6 +1,7 @@
 #pragma once
 
-/// A vector that holds its few elements in itself, for what must take no memory in every frame.
+/// A vector that holds its few elements in itself, for what must take no memory in every frame. (Boost's
+/// static_vector is no contiguous range in Boost 1.74, so it does not convert to std::span.)
 
 #include <algorithm>
 #include <array>
@@ -52,16 +53,5 @@ class BoundedVector {
   std::array<T, Capacity> elements_{};
   std::size_t size_ = 0;
 };
-
-/// Sorts a few elements, equal ones as they stood; takes no memory.
-template <typename Range, typename Before>
-void sort_few(Range&& elements, Before before) {
-  for (auto next = elements.begin(); next != elements.end(); ++next) {
-    const auto element = *next;
-    auto place = next;
-    for (; place != elements.begin() && before(element, *(place - 1)); --place) *place = *(place - 1);
-    *place = element;
-  }
-}
 
 }  // namespace eigenpose

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <stdexcept>
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/random.h"
 #include "core/image/foreground.h"
 #include "core/image/region.h"
 
@@ -17,16 +17,6 @@ constexpr int tries = 4000;          // places that are tried for an object
 constexpr int apart = 12;            // pixels between objects that do not touch, or more
 constexpr int least_touching = 8;    // pixels of an object beside another that it touches
 constexpr double least_union = 0.5;  // a box is an object's where it shares so much of both boxes' union
-
-/// Numbers that are the same with every library.
-class Random {
- public:
-  explicit Random(unsigned seed) : generator_(seed) {}
-  int below(int count) { return static_cast<int>(generator_() % static_cast<unsigned>(count)); }
-
- private:
-  std::mt19937 generator_;
-};
 
 cv::Mat grown(const cv::Mat& mask, int border) {
   cv::Mat out;
@@ -63,7 +53,7 @@ std::optional<SceneComposer::Cut> SceneComposer::cut(const SetView& shown) {
 }
 
 ComposedScene SceneComposer::compose(std::size_t index) {
-  Random random(options_.seed * 1000003U + static_cast<unsigned>(index));
+  SeededRandom random(options_.seed * 1000003U + static_cast<unsigned>(index));
   const int wanted = 2 + random.below(3);
   std::vector<Cut> cuts;
   std::vector<SetView> shown;

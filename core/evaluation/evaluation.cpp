@@ -1,20 +1,19 @@
 #include "core/evaluation/evaluation.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <numeric>
-#include <random>
 #include <stdexcept>
+#include <utility>
 
-#include <opencv2/imgproc.hpp>
-
-#include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/base/statistics.h"
+#include "core/base/work_meter.h"
 #include "core/image/occlusion.h"
+#include "core/learning/calibration/perturbation.h"
 
 namespace eigenpose {
 namespace {
@@ -96,7 +95,7 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
     auto parts = std::make_shared<PartsModel>(*model.parts);
     const MatchThresholds thresholds = match_thresholds(learning.match, options, object);
     parts->sure_ratio = thresholds.sure_ratio;
-    parts->covered_evidence = occlusion_threshold(learning.covered, options.stranger_rate, object);
+    parts->covered_evidence = occlusion_threshold(learning.covered, options.false_acceptance_rate, object);
     for (std::size_t o = 0; o < learning.match.size(); ++o) {
       PartsCalibration& own = parts->calibration[o];
       own.rejection_distance = thresholds.rejection_distance[o];
@@ -111,47 +110,81 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
   return rest;
 }
 
+/// What the stages of an evaluation share.
+struct Task {
+  std::span<const ImageSet> sets;
+  std::span<const SetView> tests;
+  const EvaluationOptions& options;
+  const Progress& progress;
+  std::stop_token stop;
+};
+
+/// Shows every test view to the model with all objects.
+void show_known(const std::shared_ptr<const Model>& model, const Task& task, EvaluationReport& report) {
+  const EvaluationOptions& options = task.options;
+  const unsigned threads = resolved_threads(options.threads);
+  std::vector<Worker> workers;
+  for (unsigned t = 0; t < threads; ++t) workers.emplace_back(model, options.recognizer);
+  std::vector<Answer> answers(task.tests.size());
+  WorkMeter meter(task.progress, task.stop, "recognising", task.tests.size());
+  parallel_for(threads, threads, [&](std::size_t t) {
+    for (std::size_t i = t; i < task.tests.size(); i += threads) {
+      meter.check_stop();
+      const SetView& test = task.tests[i];
+      answers[i] = recognize_one(workers[t], task.sets[test.set], test.view, options.damage, i);
+      meter.finished(1);
+    }
+  });
+  for (std::size_t i = 0; i < answers.size(); ++i)
+    count(report, report.objects[task.tests[i].set], answers[i]);
+  for (const Worker& worker : workers) {
+    add(report.times, worker.spent);
+    report.load_time += worker.load_time;
+  }
+}
+
 /// Shows every test view to a model without its object.
-void show_strangers(const std::shared_ptr<const Model>& model, std::span<const ImageSet> sets,
-                    std::span<const SetView> tests, const EvaluationOptions& options,
-                    EvaluationReport& report, const Progress& progress, const std::stop_token& stop) {
-  if (sets.size() < 2)
+void show_unknown(const Model& model, const Task& task, EvaluationReport& report) {
+  const EvaluationOptions& options = task.options;
+  if (task.sets.size() < 2)
     throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
-  std::vector<std::size_t> accepted(sets.size(), 0);
-  std::vector<std::size_t> shown(sets.size(), 0);
-  std::atomic<std::size_t> done = 0;
-  parallel_for(sets.size(), options.threads, [&](std::size_t s) {
-    Worker worker(without_object(*model, s, report.learning, options.learning.match), options.recognizer);
-    for (std::size_t i = 0; i < tests.size(); ++i) {
-      if (tests[i].set != s) continue;
-      if (stop.stop_requested()) throw Interrupted();
-      const Answer answer = recognize_one(worker, sets[s], tests[i].view, options.damage, i);
+  std::vector<std::size_t> accepted(task.sets.size(), 0);
+  std::vector<std::size_t> shown(task.sets.size(), 0);
+  WorkMeter meter(task.progress, task.stop, "showing unknown objects", task.sets.size());
+  parallel_for(task.sets.size(), options.threads, [&](std::size_t s) {
+    Worker worker(without_object(model, s, report.learning, options.learning.match), options.recognizer);
+    for (std::size_t i = 0; i < task.tests.size(); ++i) {
+      if (task.tests[i].set != s) continue;
+      meter.check_stop();
+      const Answer answer = recognize_one(worker, task.sets[s], task.tests[i].view, options.damage, i);
       ++shown[s];
       if (answer.verdict == Verdict::recognized || answer.verdict == Verdict::ambiguous) ++accepted[s];
     }
-    if (progress) progress({"showing strangers", ++done, sets.size()});
+    meter.finished(1);
   });
   report.strangers = std::accumulate(shown.begin(), shown.end(), std::size_t{0});
   report.false_accepts = std::accumulate(accepted.begin(), accepted.end(), std::size_t{0});
 }
 
-SceneReport show_scenes(const std::shared_ptr<const Model>& model, std::span<const ImageSet> sets,
-                        std::span<const SetView> tests, const EvaluationOptions& options,
-                        const Progress& progress, const std::stop_token& stop) {
+/// Shows scenes composed of test views.
+SceneReport show_scenes(const std::shared_ptr<const Model>& model, const Task& task) {
+  const EvaluationOptions& options = task.options;
   SceneReport report;
-  std::mutex mutex;  // guards report and progress
+  std::mutex mutex;  // guards report
+  WorkMeter meter(task.progress, task.stop, "composing scenes", options.scenes.count);
   const unsigned threads = resolved_threads(options.threads);
   parallel_for(threads, threads, [&](std::size_t t) {
-    SceneComposer composer(sets, tests, options.scenes, model->normalization.segmentation);
+    SceneComposer composer(task.sets, task.tests, options.scenes, model->normalization.segmentation);
     Recognizer recognizer(model, options.recognizer);
     for (std::size_t i = t; i < options.scenes.count; i += threads) {
-      if (stop.stop_requested()) throw Interrupted();
+      meter.check_stop();
       const ComposedScene scene = composer.compose(i);
-      if (scene.objects.empty()) continue;
-      const auto outcomes = recognizer.recognize(scene.picture);
-      const std::lock_guard lock(mutex);
-      count_scene(scene, sets, outcomes, report);
-      if (progress) progress({"composing scenes", report.scenes, options.scenes.count});
+      if (!scene.objects.empty()) {
+        const auto outcomes = recognizer.recognize(scene.picture);
+        const std::lock_guard lock(mutex);
+        count_scene(scene, task.sets, outcomes, report);
+      }
+      meter.finished(1);
     }
   });
   return report;
@@ -160,27 +193,14 @@ SceneReport show_scenes(const std::shared_ptr<const Model>& model, std::span<con
 }  // namespace
 
 cv::Mat damaged(const cv::Mat& picture, const TestDamage& damage, std::size_t index) {
-  // std::uniform_real_distribution differs between libraries; the generator does not.
-  std::mt19937 random(damage.seed * 1000003U + static_cast<unsigned>(index));
-  const auto each_way = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
-  const double dx = damage.shift * each_way() * picture.cols / 128.0;
-  const double dy = damage.shift * each_way() * picture.cols / 128.0;
-  const double scale = 1.0 + damage.scale * each_way();
-  const double turn = damage.rotation_deg * each_way() * std::numbers::pi / 180.0;
-  const double across = 0.5 * (each_way() + 1.0);
-  const double down = 0.5 * (each_way() + 1.0);
-  cv::Mat result;
-  if (damage.shift > 0 || damage.scale > 0 || damage.rotation_deg > 0) {
-    const double cosine = scale * std::cos(turn);
-    const double sine = scale * std::sin(turn);
-    const double x = 0.5 * picture.cols - 0.5;
-    const double y = 0.5 * picture.rows - 0.5;
-    const cv::Matx23d map(cosine, -sine, x + dx - cosine * x + sine * y, sine, cosine,
-                          y + dy - sine * x - cosine * y);
-    cv::warpAffine(picture, result, map, picture.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  } else {
-    result = picture.clone();
-  }
+  SeededRandom random(damage.seed * 1000003U + static_cast<std::uint32_t>(index));
+  const Perturbation bounds{damage.shift / 128.0, damage.scale, damage.rotation_deg};
+  // Drawn whether used or not: a kind of damage that is added leaves the others as they were.
+  const Misalignment misalignment = bounds.draw(random);
+  const double across = random.unit();
+  const double down = random.unit();
+  const bool displace = damage.shift > 0 || damage.scale > 0 || damage.rotation_deg > 0;
+  cv::Mat result = displace ? displaced(picture, misalignment) : picture.clone();
   if (damage.occlusion > 0) hide_square(result, damage.occlusion, across, down);
   return result;
 }
@@ -249,30 +269,13 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
     report.objects.push_back(std::move(object));
   }
 
-  const unsigned threads = resolved_threads(options.threads);
-  std::vector<Worker> workers;
-  for (unsigned t = 0; t < threads; ++t) workers.emplace_back(model, options.recognizer);
-  std::vector<Answer> answers(tests.size());
-  std::mutex progress_mutex;
-  std::size_t done = 0;  // guarded by progress_mutex
-  parallel_for(threads, threads, [&](std::size_t t) {
-    for (std::size_t i = t; i < tests.size(); i += threads) {
-      if (stop.stop_requested()) throw Interrupted();
-      answers[i] = recognize_one(workers[t], sets[tests[i].set], tests[i].view, options.damage, i);
-      const std::lock_guard lock(progress_mutex);
-      if (progress) progress({"recognising", ++done, tests.size()});
-    }
-  });
-  for (std::size_t i = 0; i < tests.size(); ++i) count(report, report.objects[tests[i].set], answers[i]);
-  for (const Worker& worker : workers) {
-    add(report.times, worker.spent);
-    report.load_time += worker.load_time;
-  }
+  const Task task{sets, tests, options, progress, std::move(stop)};
+  show_known(model, task, report);
   if (model->parts) report.smallest_rate = model->parts->smallest_rate;
   for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->memory(o);
   report.model_bytes /= model->objects.size();
-  if (options.leave_one_out) show_strangers(model, sets, tests, options, report, progress, stop);
-  if (options.scenes.count > 0) report.scenes = show_scenes(model, sets, tests, options, progress, stop);
+  if (options.leave_one_out) show_unknown(*model, task, report);
+  if (options.scenes.count > 0) report.scenes = show_scenes(model, task);
   return report;
 }
 

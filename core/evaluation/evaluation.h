@@ -41,7 +41,7 @@ struct EvaluationOptions {
   LearningOptions learning;
   RecognizerOptions recognizer;
   TestDamage damage;
-  /// Also show the test views of every object to a model that does not hold it: they are strangers. The
+  /// Also show the test views of every object to a model that does not hold it: an unknown object. The
   /// object is taken out of the learned model, and its views out of what thresholds are set from; eigenspaces
   /// stay as learned with all.
   bool leave_one_out = false;

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Which learned objects and which poses look alike: what a camera cannot tell apart, told before anybody
-/// stands puzzled before it.
+/// Which learned objects, and which poses of one object, look alike: what recognition will not distinguish,
+/// found after learning.
 
 #include <cstddef>
 #include <vector>
@@ -20,8 +20,8 @@ struct Resemblance {
   double share = 0.0;     ///< of the poses of one of them that look like some pose of the other, 0…1
 };
 
-/// Pairs of objects of which a view of one would pass for the other, were it not known itself: within the
-/// other's rejection distance. Closest first.
+/// Pairs of objects that would be confused if only one of them had been learned: a view of one lies within
+/// the rejection distance of the other. Closest first.
 std::vector<Resemblance> alike_objects(const Model& model, unsigned threads = 0);
 
 /// Objects with poses, more than `poses_apart` of a DOF's range away from each other, that are no farther

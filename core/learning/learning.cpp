@@ -160,7 +160,7 @@ void learn_parts_model(const Run& run, const TrainingViews& views, const Eigen::
   OcclusionCalibrationOptions occlusion;
   occlusion.threads = run.options.threads;
   run.report.covered = measure_occlusion(*parts, pictures, occlusion, run.progress, run.stop);
-  parts->covered_evidence = occlusion_threshold(run.report.covered, run.options.match.stranger_rate);
+  parts->covered_evidence = occlusion_threshold(run.report.covered, run.options.match.false_acceptance_rate);
 }
 
 }  // namespace
@@ -218,7 +218,7 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   result.manifold_time = watch.lap();
 
   result.evidence =
-      measure_rejection(views, model.eigenspace, points, manifolds, options.rejection, progress, stop);
+      measure_rejection({views, model.eigenspace, points, manifolds}, options.rejection, progress, stop);
   result.rejection_time = watch.lap();
 
   std::vector<ObjectEigenspace> spaces;

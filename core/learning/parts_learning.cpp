@@ -1,27 +1,25 @@
 #include "core/learning/parts_learning.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
-#include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/base/statistics.h"
+#include "core/base/work_meter.h"
+#include "core/manifold/sample_grid.h"
 #include "core/windows/foreshortened_views.h"
 
 namespace eigenpose {
 namespace {
 
 constexpr double foreshortenings[] = {1.0, 0.8, 1.25};
-/// The spline's error at a view that was left out is measured over twice the learned step; between learned
+/// The interpolation error at a left-out view is that of twice the learned step; halfway between learned
 /// views it is this many times smaller.
 constexpr double left_out_over_between = 40.0;
-constexpr double default_noise = 5e-3;  // where too few views can be left out
-
-void check_stop(const std::stop_token& stop) {
-  if (stop.stop_requested()) {
-    throw Interrupted();
-  }
-}
+constexpr double default_noise = 5e-3;  // where too few views can be left out, and for several DOFs
 
 /// True where the views of some axis are farther apart than `step` of its range.
 bool sparse(const std::vector<SampleAxis>& axes, double step) {
@@ -31,21 +29,15 @@ bool sparse(const std::vector<SampleAxis>& axes, double step) {
   });
 }
 
-/// The two neighbours of a view along the axis that runs fastest and has more than one view.
-std::array<int, 2> neighbours_of(const std::vector<SampleAxis>& axes, int view) {
-  int stride = 1;
+/// The two neighbours of a view along the axis that runs fastest and has more than one view; −1 for none.
+std::array<int, 2> neighbours_of(std::span<const SampleAxis> axes, const Grid& grid, std::size_t view) {
   for (std::size_t a = axes.size(); a-- > 0;) {
-    const int count = static_cast<int>(axes[a].samples.size());
-    if (count > 1 && axes[a].dof.periodic) {
-      const int place = view / stride % count;
-      const auto moved = [&](int to) { return view + ((to + count) % count - place) * stride; };
-      return {moved(place + 1), moved(place - 1)};
-    }
-    if (count > 1) {
-      const int place = view / stride % count;
-      return {place + 1 < count ? view + stride : -1, place > 0 ? view - stride : -1};
-    }
-    stride *= count;
+    if (grid.count(a) < 2) continue;
+    const auto beside = [&](int steps) {
+      const auto found = grid.neighbour(view, a, steps, ends_of(axes[a]));
+      return found ? static_cast<int>(*found) : -1;
+    };
+    return {beside(1), beside(-1)};
   }
   return {-1, -1};
 }
@@ -84,28 +76,32 @@ std::vector<std::array<int, 2>> nearest_views(const PartsViews& views) {
   return result;
 }
 
-/// What a learned view is compared with: itself, or a picture made of it.
+/// A picture that regions are compared with: a learned view, or a copy made of it.
 struct Lane {
   std::size_t view = 0;
   cv::Mat picture;  ///< empty: the view itself
 };
 
-/// Candidates and lanes of one object.
-std::vector<Lane> make_lanes(const PartsViews& views, bool companions, PartsObject& object) {
+/// Which copies of the views are learned beside them.
+enum class Copies { none, foreshortened_and_mirrored };
+
+/// Lanes of one object; sets its candidates and their neighbours.
+std::vector<Lane> make_lanes(const PartsViews& views, Copies copies, PartsObject& object) {
+  const bool companions = copies == Copies::foreshortened_and_mirrored;
   std::vector<Lane> lanes;
   const int count = static_cast<int>(views.count);
   std::vector<std::array<int, 2>> neighbours;
-  if (views.poses.size() > 0)
+  if (views.poses.size() > 0) {
     neighbours = nearest_views(views);
-  else
-    for (int v = 0; v < count; ++v) neighbours.push_back(neighbours_of(views.axes, v));
+  } else {
+    const Grid grid = grid_of(views.axes);
+    for (std::size_t v = 0; v < views.count; ++v) neighbours.push_back(neighbours_of(views.axes, grid, v));
+  }
   for (int copy = 0; copy < (companions ? 2 : 1); ++copy) {
     for (int v = 0; v < count; ++v) {
       object.candidates.push_back({v, copy == 1});
       std::array<int, 2> near = neighbours[static_cast<std::size_t>(v)];
-      for (int& n : near) {
-        n = n < 0 ? n : n + copy * count;
-      }
+      for (int& n : near) n = n < 0 ? n : n + copy * count;
       object.neighbours.push_back(near);
       cv::Mat picture;
       if (companions) {
@@ -113,9 +109,7 @@ std::vector<Lane> make_lanes(const PartsViews& views, bool companions, PartsObje
         picture = copy == 1 ? mirrored(view) : view;
       }
       for (const double factor : foreshortenings) {
-        if (factor != 1.0 && !companions) {
-          continue;
-        }
+        if (factor != 1.0 && !companions) continue;
         lanes.push_back(
             {static_cast<std::size_t>(v), factor == 1.0 ? picture : foreshortened(picture, factor)});
         object.lane_candidate.push_back(static_cast<std::uint32_t>(object.candidates.size() - 1));
@@ -129,19 +123,65 @@ double median_left_out_error(const std::vector<AlignmentEigenspace>& spaces) {
   std::vector<double> medians;
   for (const AlignmentEigenspace& space : spaces) {
     std::vector<double> errors = space.left_out_errors();
-    if (errors.empty()) {
-      continue;
+    if (!errors.empty()) medians.push_back(upper_median(errors));
+  }
+  return medians.empty() ? default_noise * left_out_over_between : upper_median(medians);
+}
+
+/// The orientation grids of all views, object after object.
+struct Grids {
+  std::vector<std::size_t> first;  ///< view of each object
+  std::vector<OrientationGrid> grids;
+};
+
+/// Computes the orientation grids of all views; takes the background level off, which goes into the model.
+Grids compute_grids(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
+                    const std::stop_token& stop, PartsModel& model) {
+  Grids result;
+  std::size_t views = 0;
+  for (const PartsViews& object : objects) {
+    result.first.push_back(views);
+    views += object.count;
+  }
+  result.grids.resize(views);
+  const Progress silent;
+  WorkMeter meter(silent, stop, "computing orientations", objects.size());
+  parallel_for(objects.size(), options.threads, [&](std::size_t o) {
+    meter.check_stop();
+    OrientationGridMaker mapper;
+    for (std::size_t v = 0; v < objects[o].count; ++v)
+      mapper.compute(objects[o].view(v), result.grids[result.first[o] + v]);
+  });
+  model.background = background_level(result.grids);
+  for (OrientationGrid& grid : result.grids) take_off(model.background, grid);
+  return result;
+}
+
+/// Coordinates of the windows of every lane, object by object; sets the model's candidates and lanes, and the
+/// scale for all coordinates.
+std::vector<std::vector<Eigen::MatrixXf>> project_windows(const std::vector<PartsViews>& objects,
+                                                          const Grids& grids,
+                                                          const PartsLearningOptions& options,
+                                                          WorkMeter& meter, PartsModel& model) {
+  std::vector<std::vector<Eigen::MatrixXf>> windows(objects.size());
+  std::vector<float> largest(objects.size(), 0.0F);
+  parallel_for(objects.size(), options.threads, [&](std::size_t o) {
+    meter.check_stop();
+    OrientationGridMaker mapper(model.background);
+    OrientationGrid made;
+    const Copies copies =
+        sparse(objects[o].axes, options.sparse_step) ? Copies::foreshortened_and_mirrored : Copies::none;
+    for (const Lane& lane : make_lanes(objects[o], copies, model.objects[o])) {
+      if (!lane.picture.empty()) mapper.compute(lane.picture, made);
+      windows[o].emplace_back();
+      model.space.project(lane.picture.empty() ? grids.grids[grids.first[o] + lane.view] : made, 1,
+                          windows[o].back(), nullptr);
+      largest[o] = std::max(largest[o], windows[o].back().cwiseAbs().maxCoeff());
     }
-    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::nth_element(errors.begin(), middle, errors.end());
-    medians.push_back(*middle);
-  }
-  if (medians.empty()) {
-    return default_noise * left_out_over_between;
-  }
-  const auto middle = medians.begin() + static_cast<std::ptrdiff_t>(medians.size() / 2);
-  std::nth_element(medians.begin(), middle, medians.end());
-  return *middle;
+    meter.finished(1);
+  });
+  model.scale = WindowScale::for_range(*std::ranges::max_element(largest));
+  return windows;
 }
 
 }  // namespace
@@ -149,7 +189,7 @@ double median_left_out_error(const std::vector<AlignmentEigenspace>& spaces) {
 PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
                        const Progress& progress, std::stop_token stop) {
   if (objects.empty() || objects.front().count == 0) {
-    throw std::invalid_argument("learning parts needs at least one object with a view");
+    throw std::invalid_argument("learning windows needs at least one object with a view");
   }
   PartsModel model;
   model.bands = objects.front().view(0).channels();
@@ -159,60 +199,21 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   model.calibration.resize(count);
   model.view_poses.resize(count);
 
-  // Cell maps of the plain views give background and window eigenspace.
-  std::vector<std::size_t> first(count);  // view of each object
-  std::size_t views = 0;
-  for (std::size_t o = 0; o < count; ++o) {
-    first[o] = views;
-    views += objects[o].count;
-  }
-  std::vector<OrientationGrid> maps(views);
+  Grids grids = compute_grids(objects, options, stop, model);
+  model.space = WindowSpace::learn(grids.grids, options.threads);
+  WorkMeter windows_meter(progress, stop, "learning windows", count);
+  auto windows = project_windows(objects, grids, options, windows_meter, model);
+  grids = {};
+  WorkMeter alignment_meter(progress, stop, "learning alignment", count);
   parallel_for(count, options.threads, [&](std::size_t o) {
-    check_stop(stop);
-    OrientationGridMaker mapper;
-    for (std::size_t v = 0; v < objects[o].count; ++v) {
-      mapper.compute(objects[o].view(v), maps[first[o] + v]);
-    }
-  });
-  model.background = background_level(maps);
-  for (OrientationGrid& map : maps) {
-    take_off(model.background, map);
-  }
-  model.space = WindowSpace::learn(maps, options.threads);
-
-  std::vector<std::vector<Eigen::MatrixXf>> windows(count);
-  std::vector<float> largest(count, 0.0F);
-  parallel_for(count, options.threads, [&](std::size_t o) {
-    check_stop(stop);
-    OrientationGridMaker mapper(model.background);
-    OrientationGrid made;
-    for (const Lane& lane :
-         make_lanes(objects[o], sparse(objects[o].axes, options.sparse_step), model.objects[o])) {
-      if (!lane.picture.empty()) mapper.compute(lane.picture, made);
-      windows[o].emplace_back();
-      model.space.project(lane.picture.empty() ? maps[first[o] + lane.view] : made, 1, windows[o].back(),
-                          nullptr);
-      largest[o] = std::max(largest[o], windows[o].back().cwiseAbs().maxCoeff());
-    }
-    if (progress && o % 8 == 0) {
-      progress({"learning windows", o, count});
-    }
-  });
-  maps = {};
-  model.scale = WindowScale::for_range(*std::max_element(largest.begin(), largest.end()));
-  parallel_for(count, options.threads, [&](std::size_t o) {
-    check_stop(stop);
+    alignment_meter.check_stop();
     model.objects[o].store = WindowStore(windows[o], model.scale);
     windows[o].clear();
     std::vector<PosePicture> pictures(objects[o].count);
-    for (std::size_t v = 0; v < objects[o].count; ++v) {
-      make_pose_picture(objects[o].view(v), pictures[v]);
-    }
+    for (std::size_t v = 0; v < objects[o].count; ++v) make_pose_picture(objects[o].view(v), pictures[v]);
     model.poses[o] = AlignmentEigenspace::learn(objects[o].axes, pictures, objects[o].poses);
     model.view_poses[o] = objects[o].poses.size() > 0 ? objects[o].poses : grid_poses(objects[o].axes);
-    if (progress && o % 8 == 0) {
-      progress({"learning pose spaces", o, count});
-    }
+    alignment_meter.finished(1);
   });
   model.noise = median_left_out_error(model.poses) / left_out_over_between;
   return model;

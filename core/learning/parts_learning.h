@@ -23,12 +23,13 @@ struct PartsViews {
 };
 
 struct PartsLearningOptions {
-  /// Views farther apart than this share of a turn (20°) get foreshortened and mirrored companions.
+  /// Where views are farther apart than this share of a turn (20°), foreshortened and mirrored copies of them
+  /// are learned, too.
   double sparse_step = 20.0 / 360.0;
   unsigned threads = 0;
 };
 
-/// Learns windows and pose spaces. Thresholds come from calibrate_parts.
+/// Learns windows and alignment eigenspaces. Thresholds come from calibrate_parts.
 /// @throws std::invalid_argument without objects or views; Interrupted.
 PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
                        const Progress& progress = {}, std::stop_token stop = {});

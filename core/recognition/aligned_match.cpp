@@ -8,9 +8,16 @@
 
 namespace eigenpose {
 
-AlignedMatch::AlignedMatch(const Model& model, const ManifoldSearch& search, double reach)
+SeparateSearches::SeparateSearches(std::span<const Manifold> manifolds) {
+  searches_.reserve(manifolds.size());
+  for (const Manifold& manifold : manifolds) searches_.push_back(make_search("tree", {&manifold, 1}));
+}
+
+AlignedMatch::AlignedMatch(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
+                           double reach)
     : model_(model),
-      search_(search),
+      all_(all),
+      separate_(separate),
       reach_(reach),
       aligner_([&] {
         AlignmentOptions options;
@@ -21,9 +28,7 @@ AlignedMatch::AlignedMatch(const Model& model, const ManifoldSearch& search, dou
       maker_(model.normalization),
       realigned_(maker_.is_picture() ? 0 : picture_length(model.normalization)),
       appearance_(model.eigenspace.length()),
-      point_(model.eigenspace.components()) {
-  for (const Manifold& manifold : search.manifolds()) own_.push_back(make_search("tree", {&manifold, 1}));
-}
+      point_(model.eigenspace.components()) {}
 
 RealignedDistance AlignedMatch::distance(std::span<const float> picture, const Misalignment& misalignment,
                                          std::size_t object) {
@@ -37,7 +42,7 @@ RealignedDistance AlignedMatch::distance(std::span<const float> picture, const M
   point_ -= mean_point_;
   RealignedDistance result;
   std::array<ClosestPoint, 2> near;
-  const std::size_t count = search_.nearest_into(point_, near, reach_);
+  const std::size_t count = all_.nearest_into(point_, near, reach_);
   bool seen = false;
   for (std::size_t i = 0; i < count; ++i) {
     if (near[i].manifold == object) {
@@ -49,7 +54,7 @@ RealignedDistance AlignedMatch::distance(std::span<const float> picture, const M
   }
   if (!seen) {
     std::array<ClosestPoint, 1> own;
-    own_[object]->nearest_into(point_, own);
+    (void)separate_[object].nearest_into(point_, own);
     result.own = own[0].distance;
   }
   return result;

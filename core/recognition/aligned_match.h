@@ -2,9 +2,9 @@
 
 /// The whole region matched with its misalignment undone (alignment inside the match).
 ///
-/// The pose space of one object says how the region lies beside the learned views. With that undone, the
-/// region is projected anew, and its distance to the manifolds in the universal eigenspace is what decides:
-/// there objects are told apart best, and strangers from known ones.
+/// The alignment eigenspace of one object gives the misalignment of the region with respect to the learned
+/// views. With that undone, the region is projected again, and its distance to the manifolds in the universal
+/// eigenspace decides: it separates the learned objects, and known objects from unknown ones, best.
 
 #include <memory>
 #include <optional>
@@ -26,12 +26,25 @@ struct RealignedDistance {
   std::optional<ClosestPoint> other;  ///< the nearest of the others within reach of the search
 };
 
+/// One search for each manifold alone. Immutable once made; const calls are thread-safe: make it once, share
+/// it.
+class SeparateSearches {
+ public:
+  /// @param manifolds are kept by reference: they outlive the searches.
+  explicit SeparateSearches(std::span<const Manifold> manifolds);
+
+  [[nodiscard]] const ManifoldSearch& operator[](std::size_t manifold) const { return *searches_[manifold]; }
+
+ private:
+  std::vector<std::unique_ptr<ManifoldSearch>> searches_;
+};
+
 /// Aligns one region after the other. Holds scratch memory: one thread at a time.
 class AlignedMatch {
  public:
-  /// @param model has parts; it and `search`, over its manifolds, outlive this. @param reach others that are
-  /// farther are not looked for.
-  AlignedMatch(const Model& model, const ManifoldSearch& search, double reach);
+  /// @param model has parts. @param all over all its manifolds, @param separate over each; the three outlive
+  /// this. @param reach other objects farther than this are not looked for.
+  AlignedMatch(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate, double reach);
 
   /// Poses of one object that fit, best first. Valid until the next call.
   const std::vector<AlignedPose>& align(const PosePicture& picture, std::size_t object) {
@@ -47,9 +60,9 @@ class AlignedMatch {
 
  private:
   const Model& model_;
-  const ManifoldSearch& search_;
+  const ManifoldSearch& all_;
+  const SeparateSearches& separate_;
   double reach_;
-  std::vector<std::unique_ptr<ManifoldSearch>> own_;  ///< one an object
   PoseAligner aligner_;
   Eigen::VectorXf mean_point_;  ///< basisᵀ mean
   AppearanceMaker maker_;

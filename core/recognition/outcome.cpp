@@ -67,6 +67,7 @@ void HypothesisPool::clear(Outcome& outcome) {
   outcome.rejection_distance = 0.0;
   outcome.covered_share = 0.0;
   outcome.confidence = 0.0;
+  outcome.unfinished = false;
 }
 
 std::vector<std::vector<double>> covariance_rows(const Outcome& outcome) {

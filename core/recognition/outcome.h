@@ -1,6 +1,6 @@
 #pragma once
 
-/// What recognition says of one region of a picture.
+/// The result of recognition for one region of a picture.
 
 #include <optional>
 #include <span>
@@ -12,7 +12,7 @@
 
 namespace eigenpose {
 
-/// Recognised, or why not. Everything but `recognized` is an ordinary result of looking, not an error.
+/// Recognised, or why not. Everything but `recognized` is an ordinary result, not an error.
 enum class Verdict {
   recognized,
   unknown,         ///< farther from every manifold than its rejection distance
@@ -43,18 +43,26 @@ struct Outcome {
   std::optional<Hypothesis> runner_up;
   /// The same object in another pose that fits about as well (symmetric or nearly symmetric objects).
   std::optional<Hypothesis> other_pose;
-  /// 1-sigma uncertainty of each value of `best->q`, in its unit; infinite where the pose cannot be seen.
+  /// 1-sigma uncertainty of each value of `best->q`, in its unit; infinite where the DOF is not observable.
   std::vector<double> q_sigma;
   /// Of `best->q`, m × m, row by row; its diagonal is q_sigma².
   std::vector<double> q_covariance;
   double rejection_distance = 0.0;  ///< of the best object; `best->distance` is compared with it
-  /// Share of the region that does not show the best object: something covers it, or stands beside it. An
-  /// object that is partly covered is recognised by its windows, whatever its distance.
+  /// Share of the region that does not show the best object: something occludes it, or stands beside it. A
+  /// partly occluded object is recognised by its windows, whatever its distance.
   double covered_share = 0.0;
-  double confidence = 0.0;  ///< 0…1; towards the rejection threshold ½ and less
+  /// 0…1; approaches ½ at the rejection threshold and falls below it beyond. The probability that the best
+  /// object is right, if regions of the best object, of the runner-up and of an unknown object at the
+  /// rejection distance are equally frequent and distances are normal: 1/(1 + L(runner-up) + L(rejection)),
+  /// L(d) = exp(−(d² − d_best²) /2σ²), σ² = typical distance²/6 (see likelihood.h). Where windows decided,
+  /// the first term is replaced by the runner-up's share of votes: (1 − occluded)·(1 − ½·v₂/v)/(1 + L).
+  double confidence = 0.0;
+  /// The search for touching objects in this region was ended by a limit: it may show more objects, or
+  /// others.
+  bool unfinished = false;
 
-  /// Sets q_covariance to m × m numbers times `scale`, and q_sigma. DOFs that are not `observable` become
-  /// infinite, and related to none.
+  /// Sets q_covariance to the m × m values of `covariance` times `scale`, and q_sigma. A DOF that is not
+  /// `observable` gets an infinite variance and no covariance with others.
   void set_covariance(std::span<const double> covariance, double scale, const std::vector<bool>& observable);
 };
 

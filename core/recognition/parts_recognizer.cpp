@@ -5,11 +5,13 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include <opencv2/imgproc.hpp>
 
 #include "core/alignment/masked_alignment.h"
 #include "core/alignment/misalignment.h"
+#include "core/base/insertion_sort.h"
 
 namespace eigenpose {
 namespace {
@@ -17,24 +19,24 @@ namespace {
 constexpr double window_count = QueryWindows::count;  // each window counts as one observation
 constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
 constexpr std::size_t most_revoted = 3;
-constexpr std::size_t most_covered_starts = 6;  // views whose neighbourhood is looked at first
-/// Of these so many are followed to the end, unless they are so much worse than the best of all objects.
-constexpr std::size_t most_covered_poses = 3;
+constexpr std::size_t most_occluded_starts = 6;  // peaks of the votes that are approached
+/// Starts that are refined: at most this many, and those within this merit of the best of all objects.
+constexpr std::size_t most_occluded_poses = 3;
 constexpr double hopeless_merit = 20.0;
-/// What votes, visible pixels and unexplained ones count for a covered pose; developed on learned views.
+/// Weights of the merit of an occluded pose: see the header.
 constexpr double vote_merit = 2.0 * window_count;
 constexpr double visible_merit = 0.15 * window_count;
 constexpr double unexplained_merit = 0.1;
-/// Of a covered region, so many objects with this share of the most votes, or more, are looked at pixel by
-/// pixel.
+/// Objects compared pixel by pixel in an occluded region: at most this many, with at least this share of the
+/// most votes.
 constexpr std::size_t most_rivals = 4;
 constexpr double rival_votes = 0.8;
-/// A second object with this share of the votes, or with so much less merit, may be it as well.
+/// It is a tie when the second object has at least this share of the votes, or at most this much less merit.
 constexpr double tied_votes = 0.97;
 constexpr double tied_merit = 2.0;
-/// What votes of the visible windows, over those of the background, weigh beside the logarithm of the cost.
+/// Weight of the votes in the evidence: see the header.
 constexpr double vote_evidence = 5.0;
-constexpr float familiar_likeness = 0.6F;  // one more alike is fully trusted
+constexpr float familiar_likeness = 0.6F;  // a window with this κ is fully trusted
 constexpr double masked_reach = 12.0 / 360.0;
 
 /// Votes of the learned views next to a pose: the best of those within one step in every DOF; where the views
@@ -48,18 +50,14 @@ double votes_near(const std::vector<float>& votes, const PartsObject& object,
   double nearest = 0.0;  // votes of the nearest view
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < object.candidates.size(); ++c) {
-    if (object.candidates[c].mirrored) {
-      continue;
-    }
+    if (object.candidates[c].mirrored) continue;
     double steps = 0.0;
     for (std::size_t a = 0; a < axes.size(); ++a) {
       const double learned = poses(static_cast<Eigen::Index>(a), object.candidates[c].view);
       steps = std::max(steps, std::fabs(axes[a].dof.difference(q[a], learned)) *
                                   static_cast<double>(axes[a].samples.size()) / axes[a].dof.period());
     }
-    if (steps <= one_step) {
-      best = std::max(best, static_cast<double>(votes[c]));
-    }
+    if (steps <= one_step) best = std::max(best, static_cast<double>(votes[c]));
     if (steps < least) {
       least = steps;
       nearest = votes[c];
@@ -70,18 +68,18 @@ double votes_near(const std::vector<float>& votes, const PartsObject& object,
 
 }  // namespace
 
-/// A pose of a covered object that is being followed.
-struct CoveredStart {
+/// A pose of an occluded object that is being followed.
+struct OccludedStart {
   MaskedPose pose;
   double votes = 0.0;
   double merit = 0.0;
 };
 
-/// An object that may be seen behind a cover.
-struct CoveredAnswer {
+/// An object that may be partly visible in an occluded region.
+struct OccludedAnswer {
   PartsAnswer answer;
-  std::vector<float> trust;          ///< of the pixels, by the object's best view
-  std::vector<CoveredStart> starts;  ///< best first, not empty
+  std::vector<float> trust;           ///< of the pixels, by the object's best view
+  std::vector<OccludedStart> starts;  ///< best first, not empty
 };
 
 struct PartsRecognizer::Impl {
@@ -108,9 +106,9 @@ struct PartsRecognizer::Impl {
   MaskedAligner masked_aligner;
   std::vector<std::size_t> everything;
   cv::Mat picture;
-  cv::Mat numbers;  ///< of the picture, once they were asked for
-  bool numbers_made = false;
-  cv::Mat aligned_numbers;
+  cv::Mat pixels;  ///< the picture as floats, once they were asked for
+  bool pixels_made = false;
+  cv::Mat aligned_pixels;
   cv::Mat aligned;
   OrientationGrid map;
   QueryWindows windows;  ///< of the picture, once they were asked for
@@ -118,25 +116,31 @@ struct PartsRecognizer::Impl {
   QueryWindows aligned_windows;
   PosePicture pose_picture;  ///< likewise
   bool pose_picture_made = false;
+  std::uint64_t pictures = 0;  ///< looked at so far
+  std::uint64_t votes = 0;     ///< taken so far
+  std::span<const PartialVote> ranked;
   std::vector<float> plain_votes;    ///< of one object's views, in the picture
   std::vector<float> aligned_votes;  ///< the same in the aligned one
   std::vector<float> likeness;
   std::vector<float> background;
 
   const PosePicture& posed();
+  void vote(std::span<const std::size_t> shortlist);
+  PartsAnswer settle(std::size_t object, Occlusion occlusion);
+  PartsIdentification identify(Occlusion occlusion);
   const std::vector<float>& votes_of(std::size_t object);
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   double foreign_share(std::size_t object, int candidate);
   /// The same of the view with most votes.
-  double covered_share(std::size_t object, const std::vector<float>& plain);
-  PartsAnswer find_poses(std::size_t object, const std::vector<float>& plain, double covered);
-  CoveredAnswer approach_occluded(std::size_t object, const std::vector<float>& plain, double covered);
+  double occluded_share(std::size_t object, const std::vector<float>& plain);
+  PartsAnswer find_poses(std::size_t object, const std::vector<float>& plain, double occluded);
+  OccludedAnswer approach_occluded(std::size_t object, const std::vector<float>& plain, double occluded);
   /// Follows the starts of this merit and more to the end.
-  void refine_occluded(CoveredAnswer& found, double hopeless);
-  void identify_occluded(std::span<const PartialVote> votes, PartsIdentification& found);
+  void refine_occluded(OccludedAnswer& found, double hopeless);
+  void identify_occluded(PartsIdentification& found);
   /// The pose of a candidate, moved by the parabola through its neighbours' votes.
-  [[nodiscard]] PoseNumbers voted_pose(std::size_t object, const std::vector<float>& plain,
-                                       int candidate) const;
+  [[nodiscard]] PoseVector voted_pose(std::size_t object, const std::vector<float>& plain,
+                                      int candidate) const;
   [[nodiscard]] std::vector<float> pixel_trust() const;
 };
 
@@ -147,22 +151,22 @@ const PosePicture& PartsRecognizer::Impl::posed() {
 }
 
 const std::vector<float>& PartsRecognizer::Impl::votes_of(std::size_t object) {
-  matcher.plain_votes(windows, object, plain_votes);
+  matcher.plain_votes(object, plain_votes);
   return plain_votes;
 }
 
 double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const PartsPose& pose) {
-  if (!numbers_made) picture.convertTo(numbers, CV_32F);
-  numbers_made = true;
-  aligned_numbers.create(numbers.size(), numbers.type());
-  const std::size_t count = numbers.total() * static_cast<std::size_t>(numbers.channels());
-  undo_misalignment({numbers.ptr<float>(), count}, numbers.cols, numbers.channels(), pose.misalignment,
-                    {aligned_numbers.ptr<float>(), count});
-  aligned_numbers.convertTo(aligned, CV_8U);
+  if (!pixels_made) picture.convertTo(pixels, CV_32F);
+  pixels_made = true;
+  aligned_pixels.create(pixels.size(), pixels.type());
+  const std::size_t count = pixels.total() * static_cast<std::size_t>(pixels.channels());
+  undo_misalignment({pixels.ptr<float>(), count}, pixels.cols, pixels.channels(), pose.misalignment,
+                    {aligned_pixels.ptr<float>(), count});
+  aligned_pixels.convertTo(aligned, CV_8U);
   mapper.compute(aligned, map);
   make_query_windows(map, model.space, model.scale, model.voting, aligned_windows);
   rematcher.match(aligned_windows, {&object, 1});
-  rematcher.plain_votes(aligned_windows, object, aligned_votes);
+  rematcher.plain_votes(object, aligned_votes);
   return votes_near(aligned_votes, model.objects[object], model.poses[object], model.view_poses[object],
                     pose.q) /
          aligned_windows.total_weight;
@@ -175,7 +179,7 @@ double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
   return static_cast<double>(foreign) / static_cast<double>(likeness.size());
 }
 
-double PartsRecognizer::Impl::covered_share(std::size_t object, const std::vector<float>& plain) {
+double PartsRecognizer::Impl::occluded_share(std::size_t object, const std::vector<float>& plain) {
   const PartsObject& parts = model.objects[object];
   int best = 0;
   for (std::size_t c = 0; c < plain.size(); ++c) {
@@ -187,7 +191,7 @@ double PartsRecognizer::Impl::covered_share(std::size_t object, const std::vecto
 }
 
 std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
-  // Every window lends its trust to the cells it covers; a pixel has the mean of its cell's windows.
+  // The trust of a cell is the mean over the windows that contain it; a pixel has its cell's, squared.
   constexpr int cells = OrientationGrid::cells;
   std::array<float, cells * cells> sum{};
   std::array<float, cells * cells> count{};
@@ -218,10 +222,10 @@ std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
 }
 
 PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<float>& plain,
-                                              double covered) {
+                                              double occluded) {
   PartsAnswer answer;
   answer.object = object;
-  answer.covered = covered;
+  answer.occluded = occluded;
   const PartsObject& parts = model.objects[object];
   const AlignmentEigenspace& space = model.poses[object];
   const auto merit = [&](const PartsPose& pose) {
@@ -235,7 +239,7 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
     answer.poses.push_back(pose);
   }
   const auto better = [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; };
-  sort_few(answer.poses, better);
+  insertion_sort(answer.poses, better);
   const double best = answer.poses.front().merit;
   for (std::size_t i = 0; i < std::min(answer.poses.size(), most_revoted); ++i) {
     PartsPose& pose = answer.poses[i];
@@ -247,20 +251,19 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
     pose.votes = 0.5 * (pose.votes + share);
     pose.merit = merit(pose);
   }
-  sort_few(answer.poses, better);
+  insertion_sort(answer.poses, better);
   return answer;
 }
 
-PoseNumbers PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
-                                              int candidate) const {
+PoseVector PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
+                                             int candidate) const {
   const PartsObject& parts = model.objects[object];
   const auto axes = model.poses[object].coarse_manifold().axes();
-  PoseNumbers q;
+  PoseVector q;
   q.resize(axes.size());
   const int view = parts.candidates[static_cast<std::size_t>(candidate)].view;
-  for (std::size_t a = 0; a < axes.size(); ++a) {
+  for (std::size_t a = 0; a < axes.size(); ++a)
     q[a] = model.view_poses[object](static_cast<Eigen::Index>(a), view);
-  }
   const auto& near = parts.neighbours[static_cast<std::size_t>(candidate)];
   if (axes.size() == 1 && near[0] >= 0 && near[1] >= 0) {
     const double after = plain[static_cast<std::size_t>(near[0])];
@@ -274,12 +277,12 @@ PoseNumbers PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vec
   return q;
 }
 
-CoveredAnswer PartsRecognizer::Impl::approach_occluded(std::size_t object, const std::vector<float>& plain,
-                                                       double covered) {
+OccludedAnswer PartsRecognizer::Impl::approach_occluded(std::size_t object, const std::vector<float>& plain,
+                                                        double occluded) {
   const PartsObject& parts = model.objects[object];
-  CoveredAnswer found;
+  OccludedAnswer found;
   found.answer.object = object;
-  found.answer.covered = covered;
+  found.answer.occluded = occluded;
   // Views with more votes than their neighbours, most votes first.
   std::vector<int> peaks;
   for (std::size_t c = 0; c < plain.size(); ++c) {
@@ -293,28 +296,28 @@ CoveredAnswer PartsRecognizer::Impl::approach_occluded(std::size_t object, const
   std::sort(peaks.begin(), peaks.end(), [&](int a, int b) {
     return plain[static_cast<std::size_t>(a)] > plain[static_cast<std::size_t>(b)];
   });
-  peaks.resize(std::min(peaks.size(), most_covered_starts));
-  // What the best view trusts is what all poses are compared on.
+  peaks.resize(std::min(peaks.size(), most_occluded_starts));
+  // All poses are compared on the pixels that the best view trusts.
   foreign_share(object, peaks.front());
   found.trust = pixel_trust();
   masked_aligner.look(posed(), model.poses[object], found.trust);
   found.starts.reserve(peaks.size());
   for (const int peak : peaks) {
-    CoveredStart start{masked_aligner.approach(voted_pose(object, plain, peak), masked_reach),
-                       plain[static_cast<std::size_t>(peak)] / windows.total_weight, 0.0};
+    OccludedStart start{masked_aligner.approach(voted_pose(object, plain, peak), masked_reach),
+                        plain[static_cast<std::size_t>(peak)] / windows.total_weight, 0.0};
     start.merit =
         vote_merit * start.votes - visible_merit * std::log(std::max(start.pose.aligned.cost, model.noise));
     found.starts.push_back(start);
   }
-  std::ranges::stable_sort(found.starts, std::greater<>(), &CoveredStart::merit);
+  std::ranges::stable_sort(found.starts, std::greater<>(), &OccludedStart::merit);
   return found;
 }
 
-void PartsRecognizer::Impl::refine_occluded(CoveredAnswer& found, double hopeless) {
+void PartsRecognizer::Impl::refine_occluded(OccludedAnswer& found, double hopeless) {
   PartsAnswer& answer = found.answer;
   masked_aligner.look(posed(), model.poses[answer.object], found.trust);
-  for (CoveredStart& start : found.starts) {
-    const bool followed = start.merit >= hopeless && answer.poses.size() < most_covered_poses;
+  for (OccludedStart& start : found.starts) {
+    const bool followed = start.merit >= hopeless && answer.poses.size() < most_occluded_poses;
     if (!followed) break;
     masked_aligner.refine(start.pose, masked_reach);
     const AlignedPose& pose = start.pose.aligned;
@@ -323,7 +326,7 @@ void PartsRecognizer::Impl::refine_occluded(CoveredAnswer& found, double hopeles
                          unexplained_merit * start.pose.unexplained;
     answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit});
   }
-  sort_few(answer.poses, [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
+  insertion_sort(answer.poses, [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
   if (!answer.poses.empty()) answer.score = 1.0 - answer.poses.front().votes;
 }
 
@@ -332,7 +335,7 @@ PartsRecognizer::~PartsRecognizer() = default;
 PartsRecognizer::PartsRecognizer(PartsRecognizer&&) noexcept = default;
 PartsRecognizer& PartsRecognizer::operator=(PartsRecognizer&&) noexcept = default;
 
-void PartsRecognizer::look(const cv::Mat& picture) {
+PartsRecognizer::Look PartsRecognizer::look(const cv::Mat& picture) {
   if (picture.rows == OrientationGrid::pixels) {
     picture.copyTo(impl_->picture);
   } else {
@@ -340,102 +343,131 @@ void PartsRecognizer::look(const cv::Mat& picture) {
                cv::INTER_AREA);
   }
   impl_->windows_made = false;
-  impl_->numbers_made = false;
+  impl_->pixels_made = false;
   impl_->pose_picture_made = false;
+  ++impl_->votes;  // those of the picture before are no longer valid
+  return {*impl_, ++impl_->pictures};
 }
 
-const PosePicture& PartsRecognizer::pose_picture() {
-  return impl_->posed();
+PartsRecognizer::Impl& PartsRecognizer::Look::impl() const {
+  if (picture_ != impl_->pictures)
+    throw std::logic_error(
+        "the recogniser has looked at another picture since; use what look() returned last");
+  return *impl_;
 }
 
-std::span<const PartialVote> PartsRecognizer::vote(std::span<const std::size_t> shortlist) {
-  if (!impl_->windows_made) {
-    impl_->mapper.compute(impl_->picture, impl_->map);
-    make_query_windows(impl_->map, impl_->model.space, impl_->model.scale, impl_->model.voting,
-                       impl_->windows);
-    impl_->windows_made = true;
-  }
-  return impl_->matcher.match(
-      impl_->windows, shortlist.empty() ? std::span<const std::size_t>(impl_->everything) : shortlist);
+const PosePicture& PartsRecognizer::Look::pose_picture() const {
+  return impl().posed();
 }
 
-double PartsRecognizer::share_of(std::size_t object) const {
-  const std::vector<float>& plain = impl_->votes_of(object);
+PartsRecognizer::Votes PartsRecognizer::Look::vote(std::span<const std::size_t> shortlist) const {
+  impl().vote(shortlist);
+  return {*impl_, impl_->votes};
+}
+
+PartsIdentification PartsRecognizer::Look::identify(std::span<const std::size_t> shortlist,
+                                                    Occlusion occlusion) const {
+  impl().vote(shortlist);
+  return impl_->identify(occlusion);
+}
+
+PartsRecognizer::Impl& PartsRecognizer::Votes::impl() const {
+  if (vote_ != impl_->votes)
+    throw std::logic_error("the recogniser has taken other votes since; use what vote() returned last");
+  return *impl_;
+}
+
+std::span<const PartialVote> PartsRecognizer::Votes::ranked() const {
+  return impl().ranked;
+}
+
+double PartsRecognizer::Votes::share_of(std::size_t object) const {
+  const std::vector<float>& plain = impl().votes_of(object);
   return static_cast<double>(*std::ranges::max_element(plain) / impl_->windows.total_weight);
 }
 
-PartsAnswer PartsRecognizer::settle(std::size_t object, bool covered) {
-  Impl& impl = *impl_;
-  const std::vector<float>& plain = impl.votes_of(object);
-  const double share = impl.covered_share(object, plain);
-  if (!covered && share <= impl.model.calibration[object].covered_share)
-    return impl.find_poses(object, plain, share);
-  CoveredAnswer found = impl.approach_occluded(object, plain, share);
-  impl.refine_occluded(found, found.starts.front().merit - hopeless_merit);
+PartsAnswer PartsRecognizer::Votes::settle(std::size_t object, Occlusion occlusion) const {
+  return impl().settle(object, occlusion);
+}
+
+void PartsRecognizer::Impl::vote(std::span<const std::size_t> shortlist) {
+  if (!windows_made) {
+    mapper.compute(picture, map);
+    make_query_windows(map, model.space, model.scale, model.voting, windows);
+    windows_made = true;
+  }
+  ++votes;
+  ranked = matcher.match(windows, shortlist.empty() ? std::span<const std::size_t>(everything) : shortlist);
+}
+
+PartsAnswer PartsRecognizer::Impl::settle(std::size_t object, Occlusion occlusion) {
+  const std::vector<float>& plain = votes_of(object);
+  const double share = occluded_share(object, plain);
+  if (occlusion == Occlusion::measured && share <= model.calibration[object].covered_share)
+    return find_poses(object, plain, share);
+  OccludedAnswer found = approach_occluded(object, plain, share);
+  refine_occluded(found, found.starts.front().merit - hopeless_merit);
   return found.answer;
 }
 
-void PartsRecognizer::Impl::identify_occluded(std::span<const PartialVote> votes,
-                                              PartsIdentification& found) {
-  std::vector<CoveredAnswer> rivals;
+void PartsRecognizer::Impl::identify_occluded(PartsIdentification& found) {
+  std::vector<OccludedAnswer> rivals;
   const auto approach = [&](const PartialVote& vote) {
     const std::vector<float>& plain = votes_of(vote.object);
-    rivals.push_back(approach_occluded(vote.object, plain, covered_share(vote.object, plain)));
+    rivals.push_back(approach_occluded(vote.object, plain, occluded_share(vote.object, plain)));
   };
-  for (std::size_t i = 0; i < std::min(most_rivals, votes.size()); ++i) {
-    if (votes[i].score < rival_votes * votes[0].score) break;
-    approach(votes[i]);
+  for (std::size_t i = 0; i < std::min(most_rivals, ranked.size()); ++i) {
+    if (ranked[i].score < rival_votes * ranked[0].score) break;
+    approach(ranked[i]);
   }
   double most = -std::numeric_limits<double>::infinity();
-  for (const CoveredAnswer& rival : rivals) most = std::max(most, rival.starts.front().merit);
+  for (const OccludedAnswer& rival : rivals) most = std::max(most, rival.starts.front().merit);
   double best = -std::numeric_limits<double>::infinity();
-  for (CoveredAnswer& rival : rivals) {
+  for (OccludedAnswer& rival : rivals) {
     refine_occluded(rival, most - hopeless_merit);
     if (!rival.answer.poses.empty()) best = std::max(best, rival.answer.poses.front().merit);
   }
-  // A second object is told in any case, as near as it was come to.
+  // The second object is reported in any case, by its approached pose if it was not refined.
   const std::size_t contenders = rivals.size();
-  if (rivals.size() == 1 && votes.size() > 1 && votes[1].score > 0.0F) approach(votes[1]);
-  for (CoveredAnswer& rival : rivals) {
+  if (rivals.size() == 1 && ranked.size() > 1 && ranked[1].score > 0.0F) approach(ranked[1]);
+  for (OccludedAnswer& rival : rivals) {
     if (!rival.answer.poses.empty()) continue;
-    const CoveredStart& start = rival.starts.front();
+    const OccludedStart& start = rival.starts.front();
     const AlignedPose& pose = start.pose.aligned;
     rival.answer.score = 1.0 - start.votes;
     rival.answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes,
                                   best - std::max(most - start.merit, hopeless_merit)});
   }
-  const auto ranked = std::span(rivals).first(contenders);
-  std::ranges::stable_sort(ranked, std::greater<>(),
-                           [](const CoveredAnswer& rival) { return rival.answer.poses.front().merit; });
+  const auto refined = std::span(rivals).first(contenders);
+  std::ranges::stable_sort(refined, std::greater<>(),
+                           [](const OccludedAnswer& rival) { return rival.answer.poses.front().merit; });
   found.best = rivals[0].answer;
   if (rivals.size() > 1) found.second = rivals[1].answer;
 }
 
-PartsIdentification PartsRecognizer::identify(std::span<const std::size_t> shortlist, bool covered) {
-  Impl& impl = *impl_;
-  const auto votes = vote(shortlist);
-  const std::size_t first = votes[0].object;
-  const std::vector<float>& plain = impl.votes_of(first);
-  const double share = impl.covered_share(first, plain);
-  covered = covered || share > impl.model.calibration[first].covered_share;
+PartsIdentification PartsRecognizer::Impl::identify(Occlusion occlusion) {
+  const std::size_t first = ranked[0].object;
+  const std::vector<float>& plain = votes_of(first);
+  const double share = occluded_share(first, plain);
+  const bool occluded = occlusion == Occlusion::assumed || share > model.calibration[first].covered_share;
   PartsIdentification found;
-  if (covered) {
-    impl.identify_occluded(votes, found);
+  if (occluded) {
+    identify_occluded(found);
   } else {
-    found.best = impl.find_poses(first, plain, share);
-    if (votes.size() > 1 && votes[1].score > 0.0F) found.second = settle(votes[1].object);
+    found.best = find_poses(first, plain, share);
+    if (ranked.size() > 1 && ranked[1].score > 0.0F)
+      found.second = settle(ranked[1].object, Occlusion::measured);
   }
   const auto votes_for = [&](const PartsAnswer& answer) {
-    return static_cast<double>(std::ranges::find(votes, answer.object, &PartialVote::object)->score);
+    return static_cast<double>(std::ranges::find(ranked, answer.object, &PartialVote::object)->score);
   };
   const double own = std::max(votes_for(found.best), 1e-9);
   if (found.second) found.second_share = votes_for(*found.second) / own;
-  if (covered) {
+  if (occluded) {
     const PartsPose& pose = found.best.poses.front();
     found.tie = found.second && found.second->poses.front().merit > pose.merit - tied_merit;
-    found.evidence =
-        vote_evidence * own / (impl.windows.total_weight * std::max(1.0 - found.best.covered, 0.1)) -
-        std::log(std::max(pose.cost, impl.model.noise)) - found.second_share;
+    found.evidence = vote_evidence * own / (windows.total_weight * std::max(1.0 - found.best.occluded, 0.1)) -
+                     std::log(std::max(pose.cost, model.noise)) - found.second_share;
   } else {
     found.tie = found.second_share > tied_votes;
   }

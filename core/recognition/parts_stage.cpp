@@ -11,14 +11,13 @@
 namespace eigenpose {
 namespace {
 
-/// Poses this much less likely than the best (natural logarithm) are not worth telling: a factor of 20.
+/// A second pose is reported if its log-likelihood is at most this much below the best: a factor of 20.
 constexpr double likely_pose = 3.0;
-/// Another pose this much less likely leaves no doubt of the best.
+/// The best pose is not in doubt if all others are this much less likely (log-likelihood).
 constexpr double sure_pose = 8.0;
-/// The curvature of the cost promises more than left-out views keep: 68 % lie within this many times its
-/// sigma.
+/// The curvature of the cost underestimates σ: 68 % of left-out views lie within this many times of it.
 constexpr double sigma_inflation = 1.8;
-/// Others farther than this do not put a match in doubt.
+/// Other objects farther than this do not put a match in doubt.
 double reach_of_others(const Model& model) {
   double largest = 0.0;
   for (const PartsCalibration& own : model.parts->calibration)
@@ -28,12 +27,13 @@ double reach_of_others(const Model& model) {
 
 }  // namespace
 
-PartsStage::PartsStage(const Model& model, const ManifoldSearch& search, HypothesisPool& pool)
+PartsStage::PartsStage(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
+                       HypothesisPool& pool)
     : model_(model),
       pool_(pool),
       recognizer_(*model.parts),
-      match_(model, search, reach_of_others(model)),
-      fused_(model.normalization, *model.parts, recognizer_),
+      match_(model, all, separate, reach_of_others(model)),
+      touching_(model.normalization, *model.parts, recognizer_),
       picture_(model.normalization.size, model.normalization.size,
                picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
@@ -43,7 +43,7 @@ bool PartsStage::accepted(const PartsIdentification& found, const RealignedDista
   if (distance.own <= calibration.sure_distance) return true;
   if (distance.own <= calibration.rejection_distance && best.score <= calibration.rejection_score)
     return true;
-  return best.covered > calibration.covered_share && best.covered <= max_occluded_share &&
+  return best.occluded > calibration.covered_share && best.occluded <= max_occluded_share &&
          found.evidence > model_.parts->covered_evidence;
 }
 
@@ -56,13 +56,14 @@ bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<
 
 std::size_t PartsStage::judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome) {
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
-  recognizer_.look(picture_);
-  return settle(picture, nearest, outcome) ? nearest : vote(picture, outcome);
+  const PartsRecognizer::Look look = recognizer_.look(picture_);
+  return settle(look, picture, nearest, outcome) ? nearest : vote(look, picture, outcome);
 }
 
-bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outcome& outcome) {
+bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t object,
+                        Outcome& outcome) {
   const PartsCalibration& calibration = model_.parts->calibration[object];
-  const std::vector<AlignedPose>& aligned = match_.align(recognizer_.pose_picture(), object);
+  const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), object);
   Finding finding;
   finding.object = object;
   finding.distance = match_.distance(picture, aligned.front().misalignment, object);
@@ -86,10 +87,9 @@ bool PartsStage::settle(std::span<const float> picture, std::size_t object, Outc
     describe(finding, true, outcome);
     return true;
   }
-  // Which object is plain, which pose is not: its windows know more.
-  recognizer_.vote({&object, 1});
-  const PartsAnswer answer = recognizer_.settle(object);
-  if (answer.covered > calibration.covered_share) return false;
+  // The object is certain, its pose is not: the windows decide.
+  const PartsAnswer answer = look.vote({&object, 1}).settle(object);
+  if (answer.occluded > calibration.covered_share) return false;
   finding.poses = answer.poses;
   describe(finding, true, outcome);
   return true;
@@ -99,11 +99,12 @@ RealignedDistance PartsStage::distance_of(std::span<const float> picture, const 
   return match_.distance(picture, answer.poses.front().misalignment, answer.object);
 }
 
-std::size_t PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
-  PartsIdentification found = recognizer_.identify();
+std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const float> picture,
+                             Outcome& outcome) {
+  PartsIdentification found = look.identify();
   RealignedDistance distance = distance_of(picture, found.best);
-  if (found.tie && found.best.covered <= model_.parts->calibration[found.best.object].covered_share) {
-    // To their windows both are it; the whole regions, each aligned as it fits best, may tell them apart.
+  if (found.tie && found.best.occluded <= model_.parts->calibration[found.best.object].covered_share) {
+    // The windows cannot distinguish the two; the whole region, aligned with each, may.
     RealignedDistance second = distance_of(picture, *found.second);
     if (second.own < distance.own) {
       std::swap(found.best, *found.second);
@@ -116,7 +117,7 @@ std::size_t PartsStage::vote(std::span<const float> picture, Outcome& outcome) {
   return found.best.object;
 }
 
-void PartsStage::describe(const FusedObject& object, Outcome& outcome) {
+void PartsStage::describe(const TouchingObject& object, Outcome& outcome) {
   describe(object.found, distance_of(object.picture, object.found.best), true, object.picture, outcome);
 }
 
@@ -126,7 +127,7 @@ void PartsStage::describe(const PartsIdentification& found, const RealignedDista
   finding.object = found.best.object;
   finding.poses = found.best.poses;
   finding.distance = distance;
-  finding.covered = found.best.covered;
+  finding.occluded = found.best.occluded;
   finding.runner_up_share = found.second_share;
   finding.tie = found.tie;
   const PartsCalibration& calibration = model_.parts->calibration[finding.object];
@@ -148,7 +149,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
   const PartsPose& best = finding.poses.front();
   pool_.fill(outcome.best, object.name, best.q, finding.distance.own);
   outcome.rejection_distance = calibration.rejection_distance;
-  outcome.covered_share = finding.covered;
+  outcome.covered_share = finding.occluded;
   outcome.set_covariance(best.q_covariance, sigma_inflation * sigma_inflation, object.dof_observable);
   if (const auto& other = finding.distance.other) {
     const ModelObject& second = model_.objects[other->manifold];
@@ -164,7 +165,7 @@ void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcom
   if (finding.runner_up_share > 0.0) {
     outcome.confidence =
         finding.margin *
-        std::clamp((1.0 - finding.covered) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
+        std::clamp((1.0 - finding.occluded) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
   } else {
     const auto beside = [&](double distance) {
       return likelihood(distance, finding.distance.own, calibration.typical_distance);

@@ -25,9 +25,9 @@ using SteadyTime = std::chrono::steady_clock;
 
 /// How far beyond the largest rejection distance the search looks for the runner-up.
 constexpr double search_reach = 1.5;
-/// Where the second best object is nearer than this times the best, the objects' own spaces decide.
+/// Where the second best object is nearer than this times the best, the objects' own eigenspaces decide.
 constexpr double second_look_ratio = 2.0;
-/// A region whose larger side has fewer pixels than this share of the appearance's side shows too little.
+/// A region is too small if its larger side has fewer pixels than this share of the appearance's side.
 constexpr double least_side_share = 0.25;
 
 /// Adds the time since it was made to a duration.
@@ -49,9 +49,9 @@ std::vector<Manifold> manifolds_of(const Model& model) {
   return manifolds;
 }
 
-/// Two poses within one and a half steps of the learned grid. The own space says more precisely where in a
-/// valley the pose is; which valley it is, the universal space decides, which has seen all objects.
-bool same_valley(const Manifold& manifold, const ClosestPoint& a, const ClosestPoint& b) {
+/// Whether two poses are within one and a half steps of the learned grid. The universal eigenspace chooses
+/// the basin, because it has seen all objects; the object's own eigenspace refines the pose within it.
+bool same_basin(const Manifold& manifold, const ClosestPoint& a, const ClosestPoint& b) {
   for (std::size_t d = 0; d < manifold.dofs(); ++d) {
     const SampleAxis& axis = manifold.axes()[d];
     const double step = axis.dof.period() / static_cast<double>(axis.samples.size());
@@ -62,7 +62,7 @@ bool same_valley(const Manifold& manifold, const ClosestPoint& a, const ClosestP
 
 }  // namespace
 
-/// The stages of recognition, each a function; what they pass on stands in the fields between them.
+/// The stages of recognition, each a function. They pass values on in the fields below.
 struct Recognizer::Impl {
   Impl(std::shared_ptr<const Model> learned, const RecognizerOptions& options);
 
@@ -72,6 +72,7 @@ struct Recognizer::Impl {
   AppearanceMaker maker;
   std::vector<Manifold> manifolds;
   std::unique_ptr<ManifoldSearch> search;
+  SeparateSearches separate;
   std::unique_ptr<ManifoldSearch> rejector;  ///< asked first, where there is one
   ObjectEigenspaceIndex object_eigenspace_index;
   std::vector<ManifoldSamples> poses;  ///< one an object
@@ -96,27 +97,27 @@ struct Recognizer::Impl {
 
   std::span<const Region> find_regions(const cv::Mat& image);
   [[nodiscard]] bool too_small(const Region& region) const;
-  /// Whether what the region shows is worth a look.
+  /// Whether the region is not recognised at all.
   [[nodiscard]] bool refused(const Region& region) const {
     return region.touches_border || too_small(region);
   }
-  /// Fills `picture()`, `appearance()` and the energy of the latter.
+  /// Sets `picture()`, `appearance()` and the energy of the latter.
   void normalize(const cv::Mat& image, std::size_t region);
-  /// The normalised picture of the region that is looked at, and its appearance.
+  /// The normalised picture of the current region, and its appearance.
   [[nodiscard]] std::span<float> picture();
-  [[nodiscard]] std::span<float> appearance() { return numbers(appearances); }
-  [[nodiscard]] std::span<float> numbers(Eigen::MatrixXf& of_batch) const {
+  [[nodiscard]] std::span<float> appearance() { return column_of(appearances); }
+  [[nodiscard]] std::span<float> column_of(Eigen::MatrixXf& of_batch) const {
     return {of_batch.col(column).data(), static_cast<std::size_t>(of_batch.rows())};
   }
-  /// Says what region `region` shows, which was normalised and projected.
-  void judge_region(const cv::Mat& image, std::size_t region);
+  /// Decides what region `region` shows, which was normalised and projected.
+  void judge_region(const cv::Mat& image, std::size_t region, const RecognitionLimits& limits);
   void find_closest();
-  /// Puts first whichever close candidate explains the whole picture best, and takes the pose from where it
-  /// is seen best.
+  /// Puts first the close candidate that explains the whole picture best, and takes its pose from the
+  /// eigenspace with the smaller pose error.
   void look_again();
   void judge(Outcome& outcome);
-  /// Puts the objects of a fused region in the place of the last outcome.
-  void take_apart(const cv::Mat& image, std::size_t region);
+  /// Replaces the last outcome by those of the touching objects of its region, if it can be split.
+  void split(const cv::Mat& image, std::size_t region, const RecognitionLimits& limits);
   void estimate_pose(Outcome& outcome, const ClosestPoint& best);
 
   Outcome& next_outcome();
@@ -130,6 +131,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
       maker(model->normalization),
       manifolds(manifolds_of(*model)),
       search(make_search(options.search, manifolds)),
+      separate(model->parts ? std::span<const Manifold>(manifolds) : std::span<const Manifold>()),
       object_eigenspace_index(*model),
       mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
       appearances(model->eigenspace.length(), most_projected),
@@ -143,7 +145,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
     search_bound = std::max(search_bound, search_reach * object.rejection_distance);
   if (options.rejector && search_bound > 0.0)
     rejector = std::make_unique<RejectionSearch>(manifolds, RejectorOptions{.distance = search_bound});
-  if (model->parts) parts.emplace(*model, *search, pool);
+  if (model->parts) parts.emplace(*model, *search, separate, pool);
 }
 
 std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
@@ -157,7 +159,7 @@ bool Recognizer::Impl::too_small(const Region& region) const {
 }
 
 std::span<float> Recognizer::Impl::picture() {
-  return numbers(maker.is_picture() ? appearances : typed_from);
+  return column_of(maker.is_picture() ? appearances : typed_from);
 }
 
 void Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
@@ -170,7 +172,7 @@ void Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
 
 void Recognizer::Impl::find_closest() {
   closest_count = (rejector ? *rejector : *search).nearest_into(point, closest, search_bound);
-  // Nothing within reach: the nearest is still worth telling.
+  // Nothing within reach: the nearest is reported all the same.
   if (closest_count == 0) closest_count = search->nearest_into(point, std::span(closest).first(1));
 }
 
@@ -199,13 +201,14 @@ void Recognizer::Impl::look_again() {
       seen.begin();
   std::rotate(closest.begin(), closest.begin() + winner, closest.begin() + winner + 1);
   const ClosestPoint& own = seen[static_cast<std::size_t>(winner)];
-  if (better_pose(closest[0]) && same_valley(model->objects[own.manifold].manifold, own, closest[0]))
+  if (better_pose(closest[0]) && same_basin(model->objects[own.manifold].manifold, own, closest[0]))
     closest[0].q = own.q;
 }
 
-void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region) {
+void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region,
+                                    const RecognitionLimits& limits) {
   const float energy = energies[static_cast<std::size_t>(column)];
-  if (!(energy > 0.0F)) return;  // black: nothing is known of it
+  if (!(energy > 0.0F)) return;  // black: nothing to compare
   // Norm and mean are folded in: basisᵀ (x/‖x‖ − mean).
   point = points.col(column) / energy - mean_point;
   find_closest();
@@ -217,7 +220,7 @@ void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region) {
   }
   const std::size_t object = parts->judge(picture(), closest[0].manifold, outcome);
   if (outcome.verdict == Verdict::unknown || parts->too_large(outcome.box.size(), object, outcome))
-    take_apart(image, region);
+    split(image, region, limits);
 }
 
 void Recognizer::Impl::judge(Outcome& outcome) {
@@ -245,20 +248,26 @@ void Recognizer::Impl::judge(Outcome& outcome) {
   }
 }
 
-void Recognizer::Impl::take_apart(const cv::Mat& image, std::size_t region) {
+void Recognizer::Impl::split(const cv::Mat& image, std::size_t region, const RecognitionLimits& limits) {
   if (model->normalization.cropped) return;
-  const TakenApart& found = parts->take_apart(segmenter.cut_out(image, region), segmenter.background());
-  // What is recognised as one gives way only to objects that make up all of it.
+  const SplitRegion& found = parts->split(segmenter.cut_out(image, region), segmenter.background(), limits);
+  outcomes[outcome_count - 1].unfinished = found.unfinished;
+  // A region recognised as one object is replaced only by objects that explain all of it.
   const bool known = outcomes[outcome_count - 1].verdict != Verdict::unknown;
   if (found.objects.empty() || (known && !found.unknown.empty())) return;
   const cv::Rect frame(0, 0, image.cols, image.rows);
   const cv::Point corner = outcomes[--outcome_count].box.tl();
-  for (const FusedObject& object : found.objects) {
+  for (const TouchingObject& object : found.objects) {
     Outcome& outcome = next_outcome();
     outcome.box = (object.box + corner) & frame;
+    outcome.unfinished = found.unfinished;
     parts->describe(object, outcome);
   }
-  for (const cv::Rect& box : found.unknown) next_outcome().box = (box + corner) & frame;
+  for (const cv::Rect& box : found.unknown) {
+    Outcome& outcome = next_outcome();
+    outcome.box = (box + corner) & frame;
+    outcome.unfinished = found.unfinished;
+  }
 }
 
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
@@ -294,7 +303,8 @@ const Model& Recognizer::model() const {
   return *impl_->model;
 }
 
-std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, RecognitionTimes* times) {
+std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, const RecognitionLimits& limits,
+                                               RecognitionTimes* times) {
   RecognitionTimes local;
   RecognitionTimes& spent = times != nullptr ? *times : local;
   spent = {};
@@ -304,7 +314,9 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
     throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
                                 cv::typeToString(image.type()));
   if (impl.model->normalization.color && image.channels() != 3)
-    throw std::invalid_argument("the model was learned in colour, the picture is grey; learn with --grey");
+    throw std::invalid_argument(
+        "the model was learned in colour, the picture is grey; learn it from grey views "
+        "(NormalizationOptions::color)");
   std::span<const Region> regions;
   {
     const Lap lap(spent.segment);
@@ -333,7 +345,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, Recognition
       if (impl.refused(regions[i])) {
         outcome.verdict = regions[i].touches_border ? Verdict::touches_border : Verdict::too_small;
       } else {
-        impl.judge_region(image, i);
+        impl.judge_region(image, i, limits);
         ++impl.column;
       }
     }

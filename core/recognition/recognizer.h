@@ -11,6 +11,7 @@
 #include "core/image/frame.h"
 #include "core/image/region.h"
 #include "core/model/model.h"
+#include "core/recognition/limits.h"
 #include "core/recognition/outcome.h"
 
 namespace eigenpose {
@@ -26,14 +27,14 @@ struct RecognitionTimes {
 
 /// How a recogniser finds the nearest manifold. Every choice but "rbf" gives the same answers.
 struct RecognizerOptions {
-  /// "tree", "exhaustive", "flann", "slab", or "rbf": networks in place of a search, approximate.
+  /// "tree", "flann", "slab", or "rbf": networks in place of a search, approximate.
   std::string search = "tree";
-  /// Ask a composite rejector first which manifolds are certainly too far.
+  /// First exclude the manifolds that are certainly too far, by a composite rejector.
   bool rejector = false;
 };
 
-/// Recognises objects with one model. Holds scratch memory: one thread at a time; make one per thread, they
-/// share the model.
+/// Recognises objects with one model. Holds scratch memory and search trees: one thread at a time; make one
+/// for each thread. The model itself is shared.
 class Recognizer {
  public:
   /// @throws std::invalid_argument for an unknown search.
@@ -44,10 +45,15 @@ class Recognizer {
 
   [[nodiscard]] const Model& model() const;
 
-  /// Every region of the picture, left to right, and what it is. The span is valid until the next call.
-  /// An empty table gives no outcome. @throws std::invalid_argument for a picture whose type or size the
-  /// model cannot take.
-  std::span<const Outcome> recognize(const cv::Mat& image, RecognitionTimes* times = nullptr);
+  /// One outcome for each region of the picture, left to right; none for an empty table. The span is valid
+  /// until the next call. @param times if given, is set. @throws std::invalid_argument for a picture whose
+  /// type or size the model cannot take.
+  std::span<const Outcome> recognize(const cv::Mat& image, const RecognitionLimits& limits,
+                                     RecognitionTimes* times = nullptr);
+  /// The same without limits.
+  std::span<const Outcome> recognize(const cv::Mat& image, RecognitionTimes* times = nullptr) {
+    return recognize(image, RecognitionLimits{}, times);
+  }
 
  private:
   struct Impl;

@@ -1,6 +1,8 @@
 #include "core/recognition/touching_objects.h"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -15,34 +17,36 @@ namespace {
 
 /// Learned sizes that differ by less than this share of the larger side are tried as one.
 constexpr double same_extent = 0.12;
-constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are told apart less finely
-/// An object may reach beyond what is seen of it by this share of its side: so much may be covered.
+constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are distinguished less finely
+/// Share of an object's side that may be hidden: its box may reach that far beyond the region.
 constexpr double most_beyond = 0.45;
-/// A box of another size than the object's costs it votes: so many of those its own views get, or more.
+/// A box of the wrong size loses votes. A trial is kept if it gets at least this share of the votes that the
+/// object's own views get.
 constexpr double least_trial_votes = 0.7;
 constexpr std::size_t most_trials = 8;  ///< boxes that are matched in full
 constexpr double place_step = 0.25;     ///< between boxes away from the corners, in their sides
 constexpr double least_filled = 0.6;    ///< of a box away from the corners: foreground
 constexpr double same_place = 0.7;      ///< of two boxes' union
-constexpr int most_looks = 3000;        ///< at boxes; then it stays with what was found
-constexpr std::size_t most_first = 3;   ///< of them, those that are followed to the end
+constexpr int most_looks = 3000;        ///< boxes looked at in one region; then the search ends
+constexpr std::size_t most_first = 3;   ///< first objects that are completed
 constexpr std::size_t most_objects = 6;
-/// A remaining piece of this share of the smallest learned box, or more, may be an object; less is outline.
+/// A remaining piece may be an object if it has at least this share of the smallest learned box; else it is
+/// outline.
 constexpr double least_piece = 0.2;
 constexpr double least_explained = 0.85;
 constexpr double plainly_explained = 0.97;  ///< no other first object is tried
-/// What others leave in an object's picture costs evidence while they are being found, and some of it even
-/// with them taken out.
+/// Remains of neighbouring objects lower the evidence, fully during the search and partly after they have
+/// been removed.
 constexpr double search_slack = 3.0;
-constexpr double most_overlapped = 0.25;  ///< of an object, in the end; strangers leave more unexplained
-constexpr double most_left_over = 0.1;    ///< what is covered by more than this gets no slack in the end
+constexpr double most_overlapped = 0.25;  ///< share of an object that others may hide; unknown ones hide more
+constexpr double most_left_over = 0.1;    ///< an object occluded by more than this gets no slack in the end
 constexpr double final_slack = 1.5;
-constexpr double beyond_doubt = 1.5;  ///< evidence more than is asked for
-/// A known object that is so much larger than it was learned may be two.
+constexpr double beyond_doubt = 1.5;  ///< evidence above the threshold
+/// A known object in a region this many times larger than it was learned may be two.
 constexpr double doubtful_size = 1.3;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
 
-/// Whether enough of a box is foreground for an object. @param sums integral of a foreground.
+/// Whether enough of a box is foreground to hold an object. @param sums integral of a foreground.
 bool filled(const cv::Rect& box, const cv::Mat& sums) {
   const cv::Rect inside = box & cv::Rect(0, 0, sums.cols - 1, sums.rows - 1);
   const auto at = [&](int x, int y) { return sums.at<int>(y, x); };
@@ -72,7 +76,7 @@ std::size_t nearest_view(const AlignmentEigenspace& space, const Eigen::MatrixXd
   return nearest;
 }
 
-/// What a mask is made of.
+/// The pieces of a mask.
 struct Piece {
   cv::Rect box;     ///< of the largest piece
   double area = 0;  ///< its pixels
@@ -96,10 +100,10 @@ Piece largest_piece(const cv::Mat& mask) {
   return largest;
 }
 
-/// Of those that are the same object in about the same place, the first.
-void keep_different(std::vector<FusedObject>& objects) {
+/// Keeps the first of those that are the same object in about the same place.
+void keep_different(std::vector<TouchingObject>& objects) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    const auto again = [&](const FusedObject& other) {
+    const auto again = [&](const TouchingObject& other) {
       return other.found.best.object == objects[i].found.best.object &&
              shared_area(other.box, objects[i].box) > same_place;
     };
@@ -129,7 +133,7 @@ TouchingObjects::TouchingObjects(const NormalizationOptions& normalization, cons
 void TouchingObjects::group_extents(double same) {
   for (std::size_t o = 0; o < parts_.extents.size(); ++o) {
     for (const cv::Size& size : parts_.extents[o]) {
-      if (size.empty()) continue;  // of an object that came ready-cut
+      if (size.empty()) continue;  // views of this object came ready-cut
       least_ = {std::min(least_.width, size.width), std::min(least_.height, size.height)};
       const double side = std::max(size.width, size.height);
       const auto like = std::ranges::find_if(extents_, [&](const Extent& known) {
@@ -147,18 +151,23 @@ bool TouchingObjects::possible(const cv::Size& region) const {
          (region.width >= 1.2 * least_.width || region.height >= 1.2 * least_.height);
 }
 
-bool TouchingObjects::look(const cv::Rect& box, std::vector<float>& picture) {
+bool TouchingObjects::may_look() {
+  const bool late = limits_->region_time != Duration::max() && std::chrono::steady_clock::now() >= deadline_;
+  unfinished_ = unfinished_ || late || looks_left_ == 0 || limits_->stop.stop_requested();
+  if (!unfinished_) --looks_left_;
+  return !unfinished_;
+}
+
+std::optional<PartsRecognizer::Look> TouchingObjects::look(const cv::Rect& box, std::vector<float>& picture) {
   crop_.create(box.size(), work_.type());
   crop_.setTo(background_.color());
   const cv::Rect inside = box & cv::Rect(0, 0, work_.cols, work_.rows);
-  if (inside.empty() || looks_left_ == 0) return false;
-  --looks_left_;
+  if (inside.empty() || !may_look()) return std::nullopt;
   work_(inside).copyTo(crop_(inside - box.tl()));
   picture.resize(picture_length(normalization_));
-  if (!(normalizer_.normalize(crop_, background_.level, picture) > 0.0F)) return false;
+  if (!(normalizer_.normalize(crop_, background_.level, picture) > 0.0F)) return std::nullopt;
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture_.total() * picture_.elemSize()});
-  recognizer_.look(picture_);
-  return true;
+  return recognizer_.look(picture_);
 }
 
 cv::Size TouchingObjects::learned_size(std::size_t object, std::span<const double> q) const {
@@ -194,11 +203,12 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
       for (int k = 0; k <= down; ++k) {
         const cv::Rect box({outline.x + room.width * i / across, outline.y + room.height * k / down}, size);
         const bool corner = (i == 0 || i == across) && (k == 0 || k == down);
-        if (places == Places::all && (corner || !filled(box, sums))) continue;  // corners have been looked at
-        if (!look(box, picture)) continue;
-        const auto votes = recognizer_.vote(extents_[e].objects);
-        const std::size_t object = votes[0].object;
-        const double share = recognizer_.share_of(object);
+        if (places == Places::all && (corner || !filled(box, sums))) continue;  // corners were tried before
+        const auto seen = look(box, picture);
+        if (!seen) continue;
+        const PartsRecognizer::Votes votes = seen->vote(extents_[e].objects);
+        const std::size_t object = votes.ranked()[0].object;
+        const double share = votes.share_of(object);
         const double own = 1.0 - parts_.calibration[object].rejection_score;
         if (share >= least_trial_votes * visible * own) all.push_back({box, e, share});
       }
@@ -211,12 +221,13 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
   return all;
 }
 
-FusedObject TouchingObjects::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
-  FusedObject object{box, {}, {}};
-  if (!look(box, object.picture)) return object;
-  object.found = recognizer_.identify(shortlist, true);
+TouchingObject TouchingObjects::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
+  TouchingObject object{box, {}, {}};
+  const auto seen = look(box, object.picture);
+  if (!seen) return object;
+  object.found = seen->identify(shortlist, Occlusion::assumed);
   const PartsPose& pose = object.found.best.poses.front();
-  // The size of the learned view, about the middle that alignment found.
+  // The size of the learned view, about the middle corrected by the misalignment.
   const cv::Size learned = learned_size(object.found.best.object, pose.q);
   const cv::Size size = learned.empty() ? box.size() : learned;
   const double side = std::max(box.width, box.height);
@@ -228,33 +239,33 @@ FusedObject TouchingObjects::settle(const cv::Rect& box, std::span<const std::si
   return object;
 }
 
-std::vector<FusedObject> TouchingObjects::candidates(const cv::Rect& outline, double visible) {
+std::vector<TouchingObject> TouchingObjects::candidates(const cv::Rect& outline, double visible) {
   for (const Places places : {Places::corners, Places::all}) {
-    std::vector<FusedObject> found = candidates(trials(outline, visible, places));
+    std::vector<TouchingObject> found = candidates(trials(outline, visible, places));
     if (!found.empty()) return found;
   }
   return {};
 }
 
-std::vector<FusedObject> TouchingObjects::candidates(std::span<const Trial> trials) {
-  std::vector<FusedObject> found;
+std::vector<TouchingObject> TouchingObjects::candidates(std::span<const Trial> trials) {
+  std::vector<TouchingObject> found;
   for (const Trial& trial : trials) {
-    FusedObject object = settle(trial.box, extents_[trial.extent].objects);
+    TouchingObject object = settle(trial.box, extents_[trial.extent].objects);
     if (!object.found.best.poses.empty()) found.push_back(std::move(object));
   }
-  const auto by_evidence = [](const FusedObject& a, const FusedObject& b) {
+  const auto by_evidence = [](const TouchingObject& a, const TouchingObject& b) {
     return a.found.evidence > b.found.evidence;
   };
   std::ranges::sort(found, by_evidence);
   keep_different(found);
   found.resize(std::min(found.size(), most_first));
-  // Again in the box that alignment set right, where there is less to be aligned.
-  for (FusedObject& object : found) {
-    FusedObject again = settle(object.box, {});
+  // Again in the corrected box, where less misalignment is left.
+  for (TouchingObject& object : found) {
+    TouchingObject again = settle(object.box, {});
     if (!again.found.best.poses.empty() && again.found.evidence > object.found.evidence)
       object = std::move(again);
   }
-  std::erase_if(found, [&](const FusedObject& object) {
+  std::erase_if(found, [&](const TouchingObject& object) {
     return !(object.found.evidence > parts_.covered_evidence - search_slack);
   });
   std::ranges::sort(found, by_evidence);
@@ -262,7 +273,7 @@ std::vector<FusedObject> TouchingObjects::candidates(std::span<const Trial> tria
   return found;
 }
 
-cv::Mat TouchingObjects::silhouette(const FusedObject& object) const {
+cv::Mat TouchingObjects::silhouette(const TouchingObject& object) const {
   const AlignmentEigenspace& space = parts_.poses[object.found.best.object];
   const int side = space.coarse().side;
   Eigen::VectorXf pixels;
@@ -281,7 +292,7 @@ cv::Mat TouchingObjects::silhouette(const FusedObject& object) const {
   return out;
 }
 
-double TouchingObjects::complete(FusedObject first, const cv::Mat& foreground, TakenApart& way) {
+double TouchingObjects::complete(TouchingObject first, const cv::Mat& foreground, SplitRegion& way) {
   const double whole = cv::countNonZero(foreground);
   cv::Mat left = foreground.clone();
   way.objects.clear();
@@ -298,36 +309,31 @@ double TouchingObjects::complete(FusedObject first, const cv::Mat& foreground, T
     if (piece.area < least_piece * least_.area()) return explained;
     way.unknown.push_back(piece.box);
     if (way.objects.size() == most_objects) return explained;
-    std::vector<FusedObject> next = candidates(piece.box, 1.0 - most_overlapped);
+    std::vector<TouchingObject> next = candidates(piece.box, 1.0 - most_overlapped);
     if (next.empty()) return explained;
     way.objects.push_back(std::move(next.front()));
   }
 }
 
-const TakenApart& TouchingObjects::take_apart(const cv::Mat& cut, const Background& background) {
-  background_ = background;
-  looks_left_ = most_looks;
-  result_ = {};
-  if (!possible(cut.size())) return result_;
-  std::vector<FusedObject>& objects = result_.objects;
-  cut.copyTo(work_);
-  const cv::Mat foreground = foreground_of(cut, background);
-  const cv::Rect outline = largest_piece(foreground).box;
-  if (outline.empty()) return result_;
-  // Of objects that overlap, one stands before the others and shows itself whole.
-  const std::vector<FusedObject> first = candidates(outline, 1.0);
+double TouchingObjects::search(const cv::Mat& cut, const cv::Mat& foreground, const cv::Rect& outline) {
   double most = 0.0;
-  TakenApart way;
-  for (const FusedObject& begun : first) {
+  SplitRegion way;
+  cut.copyTo(work_);
+  // Of objects that overlap, the one in front is visible as a whole.
+  for (const TouchingObject& first : candidates(outline, 1.0)) {
     cut.copyTo(work_);
-    const double explained = complete(begun, foreground, way);
+    const double explained = complete(first, foreground, way);
     if (explained > most) {
       most = explained;
       result_ = way;
     }
     if (most > plainly_explained) break;
   }
-  // Each once more, without the others in its picture.
+  return most;
+}
+
+void TouchingObjects::match_again(const cv::Mat& cut) {
+  std::vector<TouchingObject>& objects = result_.objects;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     cut.copyTo(work_);
     const cv::Mat own = silhouette(objects[i]);
@@ -337,29 +343,52 @@ const TakenApart& TouchingObjects::take_apart(const cv::Mat& cut, const Backgrou
       other.setTo(0, own);
       work_.setTo(background_.color(), other);
     }
-    FusedObject again = settle(objects[i].box, std::span(&objects[i].found.best.object, 1));
+    TouchingObject again = settle(objects[i].box, std::span(&objects[i].found.best.object, 1));
     if (again.found.best.poses.empty()) continue;
     again.found.second = objects[i].found.second;
     again.found.second_share = objects[i].found.second_share;
     again.found.tie = objects[i].found.tie;
     objects[i] = std::move(again);
   }
-  const auto sure = [&](const FusedObject& object, double slack) {
-    return object.found.best.covered <= most_overlapped &&
+}
+
+void TouchingObjects::accept(double explained) {
+  std::vector<TouchingObject>& objects = result_.objects;
+  const auto sure = [&](const TouchingObject& object, double slack) {
+    return object.found.best.occluded <= most_overlapped &&
            object.found.evidence > parts_.covered_evidence - slack;
   };
-  const bool all = objects.size() > 1 && most > least_explained &&
-                   std::ranges::all_of(objects, [&](const FusedObject& object) {
-                     return sure(object, object.found.best.covered <= most_left_over ? final_slack : 0.0);
+  const bool all = objects.size() > 1 && explained > least_explained &&
+                   std::ranges::all_of(objects, [&](const TouchingObject& object) {
+                     return sure(object, object.found.best.occluded <= most_left_over ? final_slack : 0.0);
                    });
-  if (all) return result_;
-  // What is beyond doubt is told even beside something that is not known.
-  std::erase_if(objects, [&](const FusedObject& object) {
+  if (all) return;
+  // An object beyond doubt is reported even beside something unknown.
+  std::erase_if(objects, [&](const TouchingObject& object) {
     if (sure(object, -beyond_doubt)) return false;
     result_.unknown.push_back(object.box);
     return true;
   });
   if (objects.empty() || result_.unknown.empty()) result_ = {};
+}
+
+const SplitRegion& TouchingObjects::split(const cv::Mat& cut, const Background& background,
+                                          const RecognitionLimits& limits) {
+  background_ = background;
+  limits_ = &limits;
+  if (limits.region_time != Duration::max())
+    deadline_ = std::chrono::steady_clock::now() + limits.region_time;
+  looks_left_ = most_looks;
+  unfinished_ = false;
+  result_ = {};
+  if (!possible(cut.size())) return result_;
+  const cv::Mat foreground = foreground_of(cut, background);
+  const cv::Rect outline = largest_piece(foreground).box;
+  if (outline.empty()) return result_;
+  const double explained = search(cut, foreground, outline);
+  match_again(cut);
+  accept(explained);
+  result_.unfinished = unfinished_;
   return result_;
 }
 

@@ -7,6 +7,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/statistics.h"
+
 namespace eigenpose {
 namespace {
 
@@ -26,9 +28,7 @@ std::array<std::uint8_t, 4> border_median(const cv::Mat& picture) {
       }
     }
     // An object that fills the frame touches two sides of it: the darker quarter is surely background.
-    const auto quarter = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 4);
-    std::nth_element(values.begin(), quarter, values.end());
-    level[static_cast<std::size_t>(b)] = *quarter;
+    level[static_cast<std::size_t>(b)] = order_statistic(values, values.size() / 4);
   }
   return level;
 }

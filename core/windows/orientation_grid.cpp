@@ -9,6 +9,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/statistics.h"
+
 namespace eigenpose {
 namespace {
 
@@ -223,9 +225,7 @@ std::array<float, 3> background_level(const std::vector<OrientationGrid>& maps) 
         }
       }
     }
-    const auto middle = corners.begin() + static_cast<std::ptrdiff_t>(corners.size() / 2);
-    std::nth_element(corners.begin(), middle, corners.end());
-    level[static_cast<std::size_t>(b)] = *middle;
+    level[static_cast<std::size_t>(b)] = upper_median(corners);
   }
   return level;
 }

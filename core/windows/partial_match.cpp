@@ -3,10 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "core/base/statistics.h"
 
 namespace eigenpose {
 namespace {
+
+/// Offset of an object that was not matched.
+constexpr std::size_t absent = std::numeric_limits<std::size_t>::max();
 
 /// exp(−x) for x ≥ 0 from a table: relative error below 1 %, 0 beyond 16.
 float fast_exp_of_minus(float x) {
@@ -23,7 +31,7 @@ float fast_exp_of_minus(float x) {
   return i < 0 ? 1.0F : i < size ? table[static_cast<std::size_t>(i)] : 0.0F;
 }
 
-/// Of numbers whose count is a multiple of eight.
+/// The largest of `count` scores, a multiple of eight.
 std::int32_t largest(const std::int32_t* numbers, std::size_t count) {
   std::array<std::int32_t, WindowStore::group> most{};
   std::copy_n(numbers, most.size(), most.begin());
@@ -66,10 +74,58 @@ float PartialMatcher::likeness(float energy, std::int32_t score) const {
   return fast_exp_of_minus(std::max(squared, 0.0F) / (2.0F * options_.width * options_.width));
 }
 
+void PartialMatcher::score_object(std::size_t i, std::size_t object) {
+  const PartsObject& parts = objects_[object];
+  parts.store.best_scores(placed_, lanes_.data());
+  const std::size_t lanes = parts.store.groups() * WindowStore::group;
+  const std::size_t candidates = parts.candidates.size();
+  for (std::size_t w = 0; w < query_->windows.size(); ++w) {
+    const std::int32_t* lane_scores = lanes_.data() + w * lanes;
+    std::int32_t* out = scores_.data() + w * row_length_ + offsets_[object];
+    if (one_lane_each_[object]) {
+      std::copy_n(lane_scores, candidates, out);
+    } else {
+      std::fill_n(out, candidates, std::numeric_limits<std::int32_t>::min());
+      for (std::size_t lane = 0; lane < parts.lane_candidate.size(); ++lane) {
+        std::int32_t& best = out[parts.lane_candidate[lane]];
+        best = std::max(best, lane_scores[lane]);
+      }
+    }
+    // Lanes that hold no view score far below all others.
+    bests_[w * shortlist_.size() + i] = largest(lane_scores, lanes);
+  }
+}
+
+std::int32_t PartialMatcher::find_background(std::size_t window) {
+  const auto rank = static_cast<std::size_t>(options_.background_rank);
+  if (shortlist_.size() <= rank) return std::numeric_limits<std::int32_t>::min();
+  const auto bests = std::span(bests_).subspan(window * shortlist_.size(), shortlist_.size());
+  sorted_.assign(bests.begin(), bests.end());
+  const std::int32_t floor = order_statistic(sorted_, rank - 1, std::greater<>());
+  background_[window] = likeness(query_->windows[window].energy, floor);
+  return floor;
+}
+
+void PartialMatcher::add_votes(std::size_t window, std::size_t i) {
+  const PartsObject& object = objects_[shortlist_[i]];
+  const std::int32_t* scores = scores_.data() + window * row_length_ + offsets_[shortlist_[i]];
+  float* votes = votes_.data() + offsets_[shortlist_[i]];
+  const std::size_t candidates = object.candidates.size();
+  kappas_.resize(candidates);
+  for (std::size_t c = 0; c < candidates; ++c)
+    kappas_[c] = likeness(query_->windows[window].energy, scores[c]);
+  for (std::size_t c = 0; c < candidates; ++c) {
+    float kappa = kappas_[c];
+    for (const int n : object.neighbours[c])
+      if (n >= 0) kappa = std::max(kappa, options_.pooling * kappas_[static_cast<std::size_t>(n)]);
+    votes[c] += query_->weights[window] * std::max(0.0F, kappa - background_[window]);
+  }
+}
+
 std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
                                                    std::span<const std::size_t> shortlist) {
   query_ = &query;
-  constexpr std::size_t absent = std::numeric_limits<std::size_t>::max();
+  shortlist_ = shortlist;
   offsets_.assign(objects_.size(), absent);
   row_length_ = 0;
   std::size_t most_lanes = 0;
@@ -81,67 +137,16 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
   const std::size_t count = query.windows.size();
   scores_.resize(count * row_length_);
   lanes_.resize(count * most_lanes);
-  placed_.place(query.windows, QueryWindows::stride, options_.tolerance, scale_);
   bests_.resize(count * shortlist.size());
-  for (std::size_t i = 0; i < shortlist.size(); ++i) {
-    const std::size_t o = shortlist[i];
-    const PartsObject& object = objects_[o];
-    object.store.best_scores(placed_, lanes_.data());
-    const std::size_t lanes = object.store.groups() * WindowStore::group;
-    const std::size_t candidates = object.candidates.size();
-    for (std::size_t w = 0; w < count; ++w) {
-      const std::int32_t* lane_scores = lanes_.data() + w * lanes;
-      std::int32_t* out = scores_.data() + w * row_length_ + offsets_[o];
-      if (one_lane_each_[o]) {
-        std::copy_n(lane_scores, candidates, out);
-      } else {
-        std::fill_n(out, candidates, std::numeric_limits<std::int32_t>::min());
-        for (std::size_t lane = 0; lane < object.lane_candidate.size(); ++lane) {
-          std::int32_t& best = out[object.lane_candidate[lane]];
-          best = std::max(best, lane_scores[lane]);
-        }
-      }
-      // Places that are no views score far below all others.
-      bests_[w * shortlist.size() + i] = largest(lane_scores, lanes);
-    }
-  }
+  placed_.place(query.windows, QueryWindows::stride, options_.tolerance, scale_);
+  for (std::size_t i = 0; i < shortlist.size(); ++i) score_object(i, shortlist[i]);
 
   votes_.assign(row_length_, 0.0F);
   background_.assign(count, 0.0F);
-  const auto rank = static_cast<std::size_t>(options_.background_rank);
   for (std::size_t w = 0; w < count; ++w) {
-    const std::int32_t* row = scores_.data() + w * row_length_;
-    const auto bests = std::span(bests_).subspan(w * shortlist.size(), shortlist.size());
-    std::int32_t floor = std::numeric_limits<std::int32_t>::min();
-    if (shortlist.size() > rank) {
-      sorted_.assign(bests.begin(), bests.end());
-      std::nth_element(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(rank - 1),
-                       sorted_.end(), std::greater<>());
-      floor = sorted_[rank - 1];
-      background_[w] = likeness(query.windows[w].energy, floor);
-    }
-    for (std::size_t i = 0; i < shortlist.size(); ++i) {
-      if (bests[i] <= floor) {
-        continue;
-      }
-      const PartsObject& object = objects_[shortlist[i]];
-      const std::int32_t* scores = row + offsets_[shortlist[i]];
-      float* votes = votes_.data() + offsets_[shortlist[i]];
-      const std::size_t candidates = object.candidates.size();
-      kappas_.resize(candidates);
-      for (std::size_t c = 0; c < candidates; ++c) {
-        kappas_[c] = likeness(query.windows[w].energy, scores[c]);
-      }
-      for (std::size_t c = 0; c < candidates; ++c) {
-        float kappa = kappas_[c];
-        for (const int n : object.neighbours[c]) {
-          if (n >= 0) {
-            kappa = std::max(kappa, options_.pooling * kappas_[static_cast<std::size_t>(n)]);
-          }
-        }
-        votes[c] += query.weights[w] * std::max(0.0F, kappa - background_[w]);
-      }
-    }
+    const std::int32_t floor = find_background(w);
+    for (std::size_t i = 0; i < shortlist.size(); ++i)
+      if (bests_[w * shortlist.size() + i] > floor) add_votes(w, i);
   }
 
   result_.clear();
@@ -156,30 +161,34 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
   return result_;
 }
 
-void PartialMatcher::plain_votes(const QueryWindows& query, std::size_t object,
-                                 std::vector<float>& votes) const {
+std::size_t PartialMatcher::offset_of(std::size_t object) const {
+  if (object >= offsets_.size() || offsets_[object] == absent)
+    throw std::invalid_argument("object " + std::to_string(object) +
+                                " was not matched: it is not on the shortlist of the last match");
+  return offsets_[object];
+}
+
+void PartialMatcher::plain_votes(std::size_t object, std::vector<float>& votes) const {
+  const std::size_t offset = offset_of(object);
   votes.assign(objects_[object].candidates.size(), 0.0F);
-  for (std::size_t w = 0; w < query.windows.size(); ++w) {
-    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
-    for (std::size_t c = 0; c < votes.size(); ++c) {
-      votes[c] += query.weights[w] * likeness(query.windows[w].energy, scores[c]);
-    }
+  for (std::size_t w = 0; w < query_->windows.size(); ++w) {
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offset;
+    for (std::size_t c = 0; c < votes.size(); ++c)
+      votes[c] += query_->weights[w] * likeness(query_->windows[w].energy, scores[c]);
   }
 }
 
 void PartialMatcher::window_likeness(std::size_t object, int candidate, std::vector<float>& likeness_of,
                                      std::vector<float>& background) const {
+  const std::size_t offset = offset_of(object);
   const std::size_t count = query_->windows.size();
   likeness_of.resize(count);
   background = background_;
   for (std::size_t w = 0; w < count; ++w) {
-    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[object];
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offset;
     float kappa = likeness(query_->windows[w].energy, scores[candidate]);
-    for (const int n : objects_[object].neighbours[static_cast<std::size_t>(candidate)]) {
-      if (n >= 0) {
-        kappa = std::max(kappa, likeness(query_->windows[w].energy, scores[n]));
-      }
-    }
+    for (const int n : objects_[object].neighbours[static_cast<std::size_t>(candidate)])
+      if (n >= 0) kappa = std::max(kappa, likeness(query_->windows[w].energy, scores[n]));
     likeness_of[w] = kappa;
   }
 }

@@ -3,10 +3,11 @@
 /// Partial matching with appearance voting: every window of a region votes for the learned views it
 /// resembles.
 ///
-/// A query window is compared with the windows of each learned view within a few cells of its place; its
-/// likeness is κ = exp(−d²/2σ²). What many objects show alike is background knowledge: the window votes only
-/// with what exceeds the 7th best object's κ. The region shows the object whose best view has the largest sum
-/// of votes.
+/// A query window w is compared with the windows of each learned view v within a few cells of its place; with
+/// d² the smallest squared distance of their coordinates, its likeness is κ(w, v) = exp(−d²/2σ²). What many
+/// objects have in common does not discriminate (background knowledge): with κ₀(w) the 7th best object's κ,
+/// the window votes max(0, κ − κ₀) times its weight. A view also gets a share of its neighbours' κ (pooling).
+/// The region shows the object whose best view has the largest sum of votes.
 
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +18,7 @@
 
 namespace eigenpose {
 
-/// One thing a window may vote for: a learned view, or its mirror image.
+/// What a window may vote for: a learned view, or its mirror image.
 struct Candidate {
   int view = 0;
   bool mirrored = false;
@@ -26,7 +27,7 @@ struct Candidate {
 /// What partial matching knows of one object.
 struct PartsObject {
   std::vector<Candidate> candidates;
-  /// store's view → candidate; several where a candidate was also learned foreshortened.
+  /// View of the store → candidate; several views where a candidate was also learned foreshortened.
   std::vector<std::uint32_t> lane_candidate;
   /// For each candidate up to two neighbours that share its votes, −1 for none.
   std::vector<std::array<int, 2>> neighbours;
@@ -41,8 +42,7 @@ struct VotingOptions {
   float floor_weight = 0.05F;  ///< weight of a window without any gradient
 };
 
-/// A window whose κ for the right view is below this shows something else: a cover, a neighbour, another
-/// object.
+/// A window whose κ for the right view is below this shows something else: an occluding or another object.
 inline constexpr float foreign_likeness = 0.3F;
 
 /// Votes for one object.
@@ -68,25 +68,35 @@ class PartialMatcher {
   PartialMatcher(std::span<const PartsObject> objects, const WindowScale& scale, VotingOptions options = {});
 
   /// Votes of `query` for each of `shortlist` (indices of objects), most votes first. Valid until the next
-  /// call.
+  /// call, as long as the query stays. @pre the shortlist is not empty.
   std::span<const PartialVote> match(const QueryWindows& query, std::span<const std::size_t> shortlist);
 
-  /// After `match`: votes without background and pooling for each candidate of one object of the shortlist.
-  void plain_votes(const QueryWindows& query, std::size_t object, std::vector<float>& votes) const;
-  /// After `match`: κ of every window of the query for one candidate and its neighbours of an object of the
-  /// shortlist, and the background κ of each window.
+  /// Votes of the query matched last for each candidate of one object, without background and pooling.
+  /// @throws std::invalid_argument for an object that was not on its shortlist.
+  void plain_votes(std::size_t object, std::vector<float>& votes) const;
+  /// κ of every window of the query matched last for one candidate of an object or its neighbours, and the
+  /// background κ of each window. @throws as plain_votes.
   void window_likeness(std::size_t object, int candidate, std::vector<float>& likeness,
                        std::vector<float>& background) const;
 
  private:
   [[nodiscard]] float likeness(float energy, std::int32_t score) const;
+  /// Scores of all windows for the candidates of the shortlist's i-th object.
+  void score_object(std::size_t i, std::size_t object);
+  /// The background score of one window, and its κ; no votes at or below that score.
+  std::int32_t find_background(std::size_t window);
+  /// Adds the votes of one window for the shortlist's i-th object.
+  void add_votes(std::size_t window, std::size_t i);
+  /// Where the object's scores of window 0 begin in scores_. @throws as plain_votes.
+  [[nodiscard]] std::size_t offset_of(std::size_t object) const;
 
   std::span<const PartsObject> objects_;
   WindowScale scale_;
   VotingOptions options_;
   std::vector<bool> one_lane_each_;  ///< objects whose candidates are their lanes
   const QueryWindows* query_ = nullptr;
-  std::vector<std::size_t> offsets_;  ///< object → its first candidate in a row of scores_
+  std::span<const std::size_t> shortlist_;  ///< within match
+  std::vector<std::size_t> offsets_;        ///< object → its first candidate in a row of scores_
   std::size_t row_length_ = 0;
   std::vector<std::int32_t> scores_;  ///< [81][candidates of the shortlist's objects]
   PlacedQueries placed_;

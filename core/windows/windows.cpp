@@ -8,6 +8,7 @@
 
 #include "core/base/linear_algebra.h"
 #include "core/base/parallel.h"
+#include "core/base/statistics.h"
 #include "core/simd/dense_kernels.h"
 
 namespace eigenpose {
@@ -85,11 +86,10 @@ WindowSpace WindowSpace::learn(const std::vector<OrientationGrid>& maps, unsigne
   });
   const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
   std::vector<float> sorted = masses;
-  const auto quantile = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 3 / 10);
-  std::nth_element(sorted.begin(), quantile, sorted.end());
+  const float least_mass = order_statistic(sorted, sorted.size() * 3 / 10);
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < masses.size(); ++i) {
-    if (masses[i] >= *quantile) {
+    if (masses[i] >= least_mass) {
       chosen.push_back(i);
     }
   }

@@ -100,9 +100,9 @@ int run(std::size_t objects) {
     for (std::size_t& name : names) name %= objects;
     for (const bool among_all : {false, true}) {
       began = bench::thread_us();
-      windows.look(region.covered);
       const PartsIdentification seen =
-          windows.identify(among_all ? std::span<const std::size_t>() : std::span<const std::size_t>(names));
+          windows.look(region.covered)
+              .identify(among_all ? std::span<const std::size_t>() : std::span<const std::size_t>(names));
       (among_all ? all : shortlist).add(bench::thread_us() - began);
       const std::string& name = model->objects[seen.best.object].name;
       found[among_all ? 1 : 0] += name == "obj" + std::to_string(region.object) ? 1 : 0;

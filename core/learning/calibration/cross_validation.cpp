@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/manifold/sample_grid.h"
 #include "core/search/search.h"
 
 namespace eigenpose {
@@ -37,8 +38,7 @@ std::vector<Fold> make_folds(const ObjectViews& object, std::size_t d) {
   if (object.poses.size() > 0) return all.size() < 2 ? std::vector<Fold>() : make_halves(object, d);
   std::vector<Fold> folds;
   if (all.size() < (axis.dof.periodic ? 6U : 5U)) return folds;
-  std::size_t inner = 1;
-  for (std::size_t a = d + 1; a < object.axes.size(); ++a) inner *= object.axes[a].samples.size();
+  const Grid grid = grid_of(object.axes);
   for (std::size_t first = 0; first < 2; ++first) {
     const auto leaves = [&](std::size_t i) {
       const bool end = i == 0 || i + 1 == all.size();
@@ -50,7 +50,7 @@ std::vector<Fold> make_folds(const ObjectViews& object, std::size_t d) {
     for (std::size_t i = 0; i < all.size(); ++i)
       if (!leaves(i)) fold.axes[d].samples.push_back(all[i]);
     for (std::size_t cell = 0; cell < object.count; ++cell) {
-      const std::size_t i = (cell / inner) % all.size();
+      const std::size_t i = grid.index(cell, d);
       if (leaves(i)) fold.left_out_values.push_back(all[i]);
       (leaves(i) ? fold.left_out : fold.kept).push_back(static_cast<Eigen::Index>(cell));
     }

@@ -6,42 +6,43 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <mutex>
-#include <numbers>
-#include <numeric>
 #include <optional>
-#include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "core/alignment/misalignment.h"
-#include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/base/statistics.h"
+#include "core/base/work_meter.h"
+#include "core/manifold/sample_grid.h"
 #include "core/recognition/aligned_match.h"
 #include "core/search/search.h"
 
 namespace eigenpose {
 namespace {
 
-/// A distance of so many scales of its object leaves no doubt; beyond, windows must agree.
+/// A region within this many scales of an object needs no window to confirm it.
 constexpr double sure_scales = 1.5;
 
-/// Error² of a spline grows by this much when the step doubles, where it can't be measured; and the bounds
-/// within which a measured growth is believed: the first power of the step, and the third.
+/// Growth of the squared interpolation error when the step doubles, where it cannot be measured; and the
+/// bounds of a measured growth: an error of the first power of the step gives at least 2, of the third
+/// power 64.
 constexpr double default_growth = 4.0;
 constexpr double least_growth = 2.0;
 constexpr double most_growth = 64.0;
-/// Of new views, so many show what could not be seen coming at the step before.
+/// Share of new views that show surfaces which were hidden one step before.
 constexpr double sudden_share = 0.02;
-/// Moved views that say enough of all objects together.
-constexpr std::size_t most_probed = 4000;
+/// Perturbed views that are enough for all objects together.
+constexpr std::size_t most_for_match = 4000;
 constexpr double most_sure_ratio = 0.3;
 constexpr double sure_margin = 0.8;
 
-/// Of the views, only every second one is kept, every fourth, every eighth.
+/// Every second view is kept, every fourth, every eighth.
 constexpr std::array<std::size_t, 3> thinnings{2, 4, 8};
 
-/// What one moved view shows.
+/// What one perturbed view shows.
 struct Probe {
   double full = 0.0;  ///< squared distance to its own manifold
   /// For each thinning, squared distance to the manifold of the kept views, minus `full`: the sum over the
@@ -115,11 +116,10 @@ ThinnedManifolds::Thinned ThinnedManifolds::thin(std::size_t d, std::size_t ever
   for (std::size_t i = 0; i < all.size(); ++i)
     if (kept(i)) axes[d].samples.push_back(all[i]);
   if (axes[d].samples.size() < 2) return {};
-  std::size_t inner = 1;
-  for (std::size_t a = d + 1; a < object_.axes.size(); ++a) inner *= object_.axes[a].samples.size();
+  const Grid grid = grid_of(object_.axes);
   std::vector<Eigen::Index> cells;
   for (std::size_t cell = 0; cell < object_.count; ++cell)
-    if (kept(cell / inner % all.size())) cells.push_back(static_cast<Eigen::Index>(cell));
+    if (kept(grid.index(cell, d))) cells.push_back(static_cast<Eigen::Index>(cell));
   Thinned result;
   result.manifold =
       std::make_unique<Manifold>(Manifold::interpolate(axes, points_(Eigen::all, cells), degree_));
@@ -145,72 +145,69 @@ std::optional<double> ThinnedManifolds::squared_distance(std::size_t d, std::siz
   return nearest[0].distance * nearest[0].distance;
 }
 
-Misalignment random_misalignment(const MatchCalibrationOptions& options, std::mt19937& random) {
-  // std::uniform_real_distribution differs between libraries; the generator does not.
-  const auto each_way = [&] { return static_cast<double>(random()) / 2147483648.0 - 1.0; };
-  Misalignment m;
-  m.dx = options.shift * each_way();
-  m.dy = options.shift * each_way();
-  m.scale = options.scale * each_way();
-  m.rotation = options.turn_deg * std::numbers::pi / 180.0 * each_way();
-  return m;
+/// What all objects are measured with.
+struct ProbeTask {
+  const Model& model;
+  const TrainingViews& views;
+  const Eigen::MatrixXd& points;  ///< K × M, of all views
+  const ManifoldSearch& all;
+  const SeparateSearches& separate;
+  const MatchCalibrationOptions& options;
+  std::size_t copies = 1;
+};
+
+/// Interpolation error of the thinned manifolds at a view, one sum over the DOFs for each thinning; −1 where
+/// there are too few views. @param full squared distance to the manifold through all views.
+std::array<double, thinnings.size()> missed_at(ThinnedManifolds& thinned, const Grid& grid, std::size_t view,
+                                               const Eigen::VectorXf& point, double full) {
+  std::array<double, thinnings.size()> missed{};
+  for (std::size_t t = 0; t < thinnings.size(); ++t)
+    for (std::size_t d = 0; d < grid.axes() && missed[t] >= 0.0; ++d) {
+      const auto squared = thinned.squared_distance(d, thinnings[t], grid.index(view, d), point);
+      missed[t] = squared ? missed[t] + std::max(0.0, *squared - full) : -1.0;
+    }
+  return missed;
 }
 
-/// Moves, aligns and measures every view of one object.
-std::vector<Probe> probe_object(const Model& model, const TrainingViews& views,
-                                const Eigen::MatrixXd& all_points, std::size_t o,
-                                const ManifoldSearch& search, const MatchCalibrationOptions& options,
-                                std::size_t copies) {
-  const ObjectViews& object = views.objects()[o];
-  const Eigen::MatrixXd points =
-      all_points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count));
-  ThinnedManifolds thinned(object, points, model.objects[o].manifold.degree());
-  const int size = model.normalization.size;
-  const int bands = picture_bands(model.normalization);
-  const bool scattered = object.poses.size() > 0;
+/// Perturbs, aligns and measures every view of one object.
+std::vector<Probe> probe_object(const ProbeTask& task, std::size_t o) {
+  const ObjectViews& object = task.views.objects()[o];
+  const Eigen::MatrixXd points = task.points.middleCols(static_cast<Eigen::Index>(object.first),
+                                                        static_cast<Eigen::Index>(object.count));
   // Views that are no grid are thinned once, over all DOFs together.
-  const std::size_t dofs = scattered ? 1 : object.axes.size();
+  const Grid grid = object.poses.size() > 0 ? Grid({object.count}) : grid_of(object.axes);
+  ThinnedManifolds thinned(object, points, task.model.objects[o].manifold.degree());
+  const NormalizationOptions& normalization = task.model.normalization;
+  const int size = normalization.size;
+  const int bands = picture_bands(normalization);
 
-  AlignedMatch match(model, search, std::numeric_limits<double>::infinity());
-  std::mt19937 random(static_cast<std::uint32_t>(o + 1));
-  const std::size_t length = picture_length(model.normalization);
+  AlignedMatch match(task.model, task.all, task.separate, std::numeric_limits<double>::infinity());
+  SeededRandom random(static_cast<std::uint32_t>(o + 1));
+  const std::size_t length = picture_length(normalization);
   std::vector<float> view(length);
   std::vector<float> moved(length);
   std::vector<std::uint8_t> bytes(length);
   PosePicture picture;
   std::vector<Probe> probes;
   for (std::size_t v = 0; v < object.count; ++v) {
-    picture_numbers(views.picture(object.first + v), view);
-    for (std::size_t copy = 0; copy < copies; ++copy) {
-      undo_misalignment(view, size, bands, random_misalignment(options, random), moved);
+    picture_numbers(task.views.picture(object.first + v), view);
+    for (std::size_t copy = 0; copy < task.copies; ++copy) {
+      undo_misalignment(view, size, bands, task.options.perturbation.draw(random), moved);
       quantize(moved, bytes);
       make_pose_picture(cv::Mat(size, size, CV_8UC(bands), bytes.data()), picture);
       const AlignedPose& pose = match.align(picture, o).front();
       const RealignedDistance distance = match.distance(moved, pose.misalignment, o);
       Probe probe;
       probe.full = distance.own * distance.own;
-      const std::size_t other = distance.other ? distance.other->manifold : o;
-      for (std::size_t t = 0; t < thinnings.size(); ++t) {
-        std::size_t inner = object.count;
-        for (std::size_t d = 0; d < dofs && probe.missed[t] >= 0.0; ++d) {
-          const std::size_t values = scattered ? object.count : object.axes[d].samples.size();
-          inner /= values;
-          const auto squared = thinned.squared_distance(d, thinnings[t], v / inner % values, match.point());
-          probe.missed[t] = squared ? probe.missed[t] + std::max(0.0, *squared - probe.full) : -1.0;
-        }
-      }
-      if (other != o)
+      probe.missed = missed_at(thinned, grid, v, match.point(), probe.full);
+      if (distance.other) {
+        const std::size_t other = distance.other->manifold;
         probe.other = match.distance(moved, match.align(picture, other).front().misalignment, other).own;
+      }
       probes.push_back(probe);
     }
   }
   return probes;
-}
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// By what factors the spline's squared error grows when the step doubles, over all objects.
@@ -231,7 +228,8 @@ Growth error_growth(const std::vector<std::vector<Probe>>& probes) {
           coarse.push_back(probe.missed[t + 1]);
         }
     if (fine.empty()) continue;
-    growth[t] = std::clamp(median(coarse) / std::max(median(fine), 1e-12), least_growth, most_growth);
+    growth[t] =
+        std::clamp(upper_median(coarse) / std::max(upper_median(fine), 1e-12), least_growth, most_growth);
   }
   if (growth[0] == 0.0) return {};
   // Coarse steps miss so much that doubling them hardly adds: growth itself grows towards finer ones.
@@ -239,17 +237,9 @@ Growth error_growth(const std::vector<std::vector<Probe>>& probes) {
   return {std::clamp(next, growth[0], most_growth), growth[0]};
 }
 
-/// The length that an object's distances are measured in: their mean and their largest tell it together.
+/// The unit of an object's distances: their mean plus half the largest.
 double scale_of(const std::vector<double>& distances) {
-  const double sum = std::accumulate(distances.begin(), distances.end(), 0.0);
-  return std::max(1e-6, sum / static_cast<double>(distances.size()) +
-                            0.5 * *std::max_element(distances.begin(), distances.end()));
-}
-
-double mean(const std::vector<double>& values) {
-  return values.empty()
-             ? 0.0
-             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return std::max(1e-6, mean(distances) + 0.5 * *std::ranges::max_element(distances));
 }
 
 /// What the probes of one object say, with the spline's error growing as over all objects.
@@ -261,7 +251,7 @@ MatchEvidence weigh(const std::vector<Probe>& probes, const Growth& growth) {
   MatchEvidence result;
   for (const Probe& probe : probes) {
     const double missed = std::max(0.0, probe.missed[0]);
-    // Generous: as if halving the step helped no more than the time before.
+    // An upper estimate: the same growth as one halving before.
     const double fresh = probe.full + missed / growth.to_half;
     squares += fresh;
     expected.push_back(std::sqrt(fresh));
@@ -269,14 +259,14 @@ MatchEvidence weigh(const std::vector<Probe>& probes, const Growth& growth) {
     if (probe.missed[0] >= 0.0) half.push_back(probe.missed[0]);
     if (probe.missed[1] >= 0.0) quarter.push_back(probe.missed[1]);
     result.others.push_back(probe.other);
-    // Had the view not been learned, another object would have been nearer: such a lead must not count.
+    // If the view had not been learned, the other object would be the nearer one: such a ratio is no proof.
     const double left_out = probe.full + missed;
     if (probe.other * probe.other < left_out)
       result.false_lead = std::min(result.false_lead, probe.other * probe.other / left_out);
   }
   result.scale = scale_of(expected);
   result.typical_distance = std::sqrt(squares / static_cast<double>(probes.size()));
-  // Of a few views it is not known; as much as it misses where it was learned is as good a guess as any.
+  // With too few views to thin, the distance of the learned views stands in.
   result.missed = half.empty() ? growth.to_learned * mean(result.learned) : mean(half);
   result.growth = growth.to_learned;
   const double mean_expected = quarter.empty() ? mean(half) : mean(quarter) / growth.to_half;
@@ -313,24 +303,25 @@ std::vector<MatchEvidence> measure_match(const Model& model, const TrainingViews
                                          const Eigen::MatrixXd& points,
                                          const MatchCalibrationOptions& options, const Progress& progress,
                                          std::stop_token stop) {
-  if (!(options.rate >= 0.0 && options.rate <= 0.5 && options.stranger_rate >= 0.0 &&
-        options.stranger_rate <= 1.0))
-    throw std::invalid_argument("the rate of wrong rejections is " + std::to_string(options.rate) +
-                                ", allowed are 0 to 0.5; that of accepted strangers is " +
-                                std::to_string(options.stranger_rate) + ", allowed are 0 to 1");
-  if (options.moved_views < 1) throw std::invalid_argument("calibration needs at least one moved view");
-  const std::size_t copies = std::clamp<std::size_t>(most_probed / views.count(), 1, options.moved_views);
+  if (!(options.rate >= 0.0 && options.rate <= 0.5 && options.false_acceptance_rate >= 0.0 &&
+        options.false_acceptance_rate <= 1.0))
+    throw std::invalid_argument("the rate of false rejections is " + std::to_string(options.rate) +
+                                ", allowed are 0 to 0.5; that of false acceptances is " +
+                                std::to_string(options.false_acceptance_rate) + ", allowed are 0 to 1");
+  if (options.copies < 1)
+    throw std::invalid_argument("calibration needs at least one perturbed copy of every view, got 0");
+  const std::size_t copies = std::clamp<std::size_t>(most_for_match / views.count(), 1, options.copies);
   std::vector<Manifold> manifolds;
   for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
   const auto search = make_search("tree", manifolds);
+  const SeparateSearches separate(manifolds);
+  const ProbeTask task{model, views, points, *search, separate, options, copies};
   std::vector<std::vector<Probe>> probes(manifolds.size());
-  std::mutex progress_mutex;
-  std::size_t done = 0;  // guarded by progress_mutex
+  WorkMeter meter(progress, std::move(stop), "calibrating alignment", manifolds.size());
   parallel_for(manifolds.size(), options.threads, [&](std::size_t o) {
-    if (stop.stop_requested()) throw Interrupted();
-    probes[o] = probe_object(model, views, points, o, *search, options, copies);
-    const std::lock_guard lock(progress_mutex);
-    if (progress) progress({"calibrating", ++done, manifolds.size()});
+    meter.check_stop();
+    probes[o] = probe_object(task, o);
+    meter.finished(1);
   });
   const Growth growth = error_growth(probes);
   std::vector<MatchEvidence> evidence;
@@ -362,14 +353,15 @@ MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
   std::sort(others.begin(), others.end());
   result.smallest_rate = 1.0 / (static_cast<double>(views) + 1.0);
   const double rate = std::max(options.rate, result.smallest_rate);
-  const auto nearest = static_cast<std::size_t>(options.stranger_rate * static_cast<double>(others.size()));
+  const auto nearest =
+      static_cast<std::size_t>(options.false_acceptance_rate * static_cast<double>(others.size()));
   const double cap = others[std::min(nearest, others.size() - 1)];
   for (std::size_t o = 0; o < evidence.size(); ++o) {
     const double scale = evidence[o].scale;
     const double known = o == without ? 0.0 : exceeded_by(evidence[o], factors, rate);
     const double rejection = std::min(known, std::max(cap, scale));
     result.rejection_distance.push_back(rejection);
-    // As near as strangers come, windows are asked, however far known views may be.
+    // Beyond the distance of unknown objects windows must confirm, whatever known views need.
     result.sure_distance.push_back(std::min({rejection, sure_scales * scale, cap}));
   }
   return result;

@@ -2,14 +2,14 @@
 
 /// Rejection distances of the aligned whole-region match, from the learned views alone.
 ///
-/// Every learned view is moved at random, as an imperfect cut-out does it, aligned, and measured against its
-/// own manifold: as learned, and without every second view, with every fourth and every eighth only. By how
-/// much the spline misses more when the step doubles is seen twice so; from both, what it misses at a new
-/// view, half a step from a learned one. How far single views are off such an expectation is seen at half the
-/// views, of which it is known what they miss, and what was to be expected from a fourth. A few views show
-/// what comes into sight at once: of these, smaller steps promise nothing. An object's threshold is the
-/// distance that a share of its new views, the rate, is expected to exceed; n views support no rate below
-/// 1/(n + 1).
+/// Every learned view is perturbed at random, aligned, and measured against its own manifold: the one through
+/// all views, and those through every second, every fourth and every eighth view. Thinning the views by 2, 4
+/// and 8 gives two estimates of how the squared interpolation error grows when the step doubles;
+/// extrapolated, they give the error at a new view, which is half a step from a learned one. The spread of
+/// single views around their expected error is measured at half the views, where both are known. For a small
+/// share of the views (surfaces that come into sight within one step) a smaller step promises nothing. An
+/// object's threshold is the distance that a share of its new views, the rate, is expected to exceed; n views
+/// support no rate below 1/(n + 1).
 
 #include <optional>
 #include <span>
@@ -17,32 +17,33 @@
 #include <vector>
 
 #include "core/base/progress.h"
+#include "core/learning/calibration/perturbation.h"
 #include "core/learning/training_views.h"
 #include "core/model/model.h"
 
 namespace eigenpose {
 
 struct MatchCalibrationOptions {
-  double rate = 0.001;           ///< share of known regions that may be rejected; 0…0.5
-  double stranger_rate = 0.005;  ///< share of strangers that may be accepted; 0…1
-  double shift = 2.0 / 128.0;    ///< of the side of the appearance, each way
-  double scale = 0.03;           ///< each way
-  double turn_deg = 3.0;         ///< in the picture's plane, each way
-  std::size_t moved_views = 2;   ///< of every learned view; fewer, but one, where they are thousands
+  double rate = 0.001;  ///< of false rejections: share of known regions that may be rejected; 0…0.5
+  double false_acceptance_rate = 0.005;  ///< share of unknown objects that may get a name; 0…1
+  Perturbation perturbation{.shift = 2.0 / 128.0, .scale = 0.03, .turn_deg = 3.0};
+  std::size_t copies = 2;  ///< perturbed copies of every learned view; one where views are thousands
   unsigned threads = 0;
 };
 
-/// What the moved views of one object show.
+/// What the perturbed views of one object show.
 struct MatchEvidence {
-  std::size_t views = 0;          ///< of which each was moved once or more
-  double scale = 0.0;             ///< in which its distances are measured
+  std::size_t views = 0;          ///< of which each was perturbed once or more
+  double scale = 0.0;             ///< unit of its distances: their mean plus half the largest
   double typical_distance = 0.0;  ///< root mean square expected of new views
-  std::vector<double> learned;    ///< squared distance of each view to the manifold that knows it
-  double missed = 0.0;            ///< what the spline adds to it where the step is twice as large, on average
-  double growth = 1.0;            ///< `missed` over what it is expected to be at new views
-  std::vector<double> factors;    ///< what it added at views left out, over what was expected on average
+  std::vector<double> learned;    ///< squared distance of each view to the manifold through all views
+  double missed = 0.0;            ///< mean interpolation error (squared) that twice the step adds
+  double growth = 1.0;            ///< ratio of `missed` to the error expected at new views
+  std::vector<double> factors;    ///< error of each left-out view over the expected mean
   std::vector<double> others;     ///< distance of each view to the nearest other object
-  double false_lead = 1.0;  ///< squared distances, other over own, of the worst view that another object wins
+  /// Smallest ratio of squared distances, other over own, among views that another object would win if the
+  /// view had not been learned.
+  double false_lead = 1.0;
 };
 
 /// Thresholds of a model.
@@ -53,17 +54,18 @@ struct MatchThresholds {
   double smallest_rate = 1.0;              ///< 1/(n + 1)
 };
 
-/// Moves, aligns and measures all views. @param model with parts and manifolds, its thresholds not yet set.
-/// @param points K × M projections of the store's views. @throws std::invalid_argument for options out of
+/// Perturbs, aligns and measures all views. @param model with parts and manifolds, its thresholds not yet
+/// set.
+/// @param points K × M projections of the views. @throws std::invalid_argument for options out of
 /// range; Interrupted.
 std::vector<MatchEvidence> measure_match(const Model& model, const TrainingViews& views,
                                          const Eigen::MatrixXd& points,
                                          const MatchCalibrationOptions& options, const Progress& progress,
                                          std::stop_token stop);
 
-/// What the evidence supports. Strangers are taken to be as unlike the learned objects as these are unlike
-/// each other: where that leaves less room than known views ask for, it wins, but never below an object's
-/// scale.
+/// The thresholds that the evidence supports. Unknown objects are assumed to be as far from the learned
+/// objects as these are from each other. Where that bound is below the one that known views need, it wins,
+/// but never below an object's scale.
 /// @param without an object whose views are not used, if any.
 MatchThresholds match_thresholds(const std::vector<MatchEvidence>& evidence,
                                  const MatchCalibrationOptions& options,

@@ -1,11 +1,12 @@
 #pragma once
 
-/// When a partly covered region is accepted: not by a distance, of which covers take any share, but by what
-/// speaks for it more than for strangers.
+/// The evidence from which a partly occluded region is accepted.
 ///
-/// Learned views are shown to the model as strangers, each to all objects but its own, as they are and with a
-/// fifth hidden; what speaks more for another object counts. A covered region is accepted when the evidence
-/// for it exceeds what all but a set share of these strangers reach.
+/// An occluder can raise the distance arbitrarily. Occluded regions are therefore accepted by evidence (see
+/// parts_recognizer.h), compared with that of learned views shown as unknown objects: each view is shown to
+/// all objects but its own, as it is and with a fifth hidden, and the larger evidence for a wrong object
+/// counts. The threshold is conformal: a region is accepted when its evidence exceeds that of all but a set
+/// share of these.
 
 #include <optional>
 #include <span>
@@ -14,11 +15,11 @@
 
 namespace eigenpose {
 
-/// What one learned view showed as a stranger.
+/// What one learned view showed as an unknown object.
 struct OcclusionEvidence {
-  std::size_t stranger = 0;   ///< the object it shows
+  std::size_t object = 0;     ///< the object it shows
   std::size_t taken_for = 0;  ///< the object it was taken for
-  double evidence = 0.0;  ///< see PartsIdentification; −∞ where it would not be taken for a covered object
+  double evidence = 0.0;      ///< see parts_recognizer.h; −∞ where it would not be accepted as occluded
 };
 
 struct OcclusionCalibrationOptions {
@@ -26,16 +27,16 @@ struct OcclusionCalibrationOptions {
   unsigned threads = 0;
 };
 
-/// Shows learned views as strangers. Empty for a model of one object. @throws Interrupted.
+/// Shows learned views as unknown objects. Empty for a model of one object. @throws Interrupted.
 std::vector<OcclusionEvidence> measure_occlusion(const PartsModel& model,
                                                  const std::vector<PartsViews>& objects,
                                                  const OcclusionCalibrationOptions& options,
                                                  const Progress& progress = {}, std::stop_token stop = {});
 
-/// The evidence that at most a share `stranger_rate` of them exceeds, and no less than is ever enough; +∞
-/// where there are none.
-/// @param without this object's views, and what was taken for it, do not count.
-double occlusion_threshold(std::span<const OcclusionEvidence> strangers, double stranger_rate,
+/// The evidence that a new unknown view exceeds with probability `false_acceptance_rate` at most, and at
+/// least the smallest value that is ever enough; +∞ without evidence. @param without an object whose views,
+/// and what was taken for it, do not count.
+double occlusion_threshold(std::span<const OcclusionEvidence> unknown, double false_acceptance_rate,
                            std::optional<std::size_t> without = {});
 
 }  // namespace eigenpose

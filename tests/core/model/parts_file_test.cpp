@@ -62,15 +62,13 @@ TEST(PartsFile, AModelReadBackGivesTheSameAnswersInEveryBit) {
   PartsRecognizer other(*read.parts);
   for (unsigned o = 0; o < 3; ++o) {
     const cv::Mat picture = test::DrawnObject(40 + o).view(71.0);
-    one.look(picture);
-    other.look(picture);
-    const auto votes = one.vote();
-    const auto again = other.vote();
-    ASSERT_EQ(votes.front().object, again.front().object);
-    EXPECT_EQ(votes.front().score, again.front().score);
-    EXPECT_EQ(votes.front().object, o);
-    const PartsAnswer answer = one.settle(o);
-    const PartsAnswer same = other.settle(o);
+    const auto votes = one.look(picture).vote();
+    const auto again = other.look(picture).vote();
+    ASSERT_EQ(votes.ranked().front().object, again.ranked().front().object);
+    EXPECT_EQ(votes.ranked().front().score, again.ranked().front().score);
+    EXPECT_EQ(votes.ranked().front().object, o);
+    const PartsAnswer answer = votes.settle(o);
+    const PartsAnswer same = again.settle(o);
     EXPECT_EQ(answer.score, same.score);
     ASSERT_EQ(answer.poses.size(), same.poses.size());
     EXPECT_EQ(answer.poses.front().q, same.poses.front().q);

@@ -184,5 +184,102 @@ TEST(Verdict, HasStableNames) {
   EXPECT_EQ(verdict_name(Verdict::touches_border), "touches_border");
 }
 
+/// A copy of the learned world's model with `change` applied to object "one".
+template <typename Change>
+std::shared_ptr<const Model> with_changed_one(const Change& change) {
+  auto model = std::make_shared<Model>(*testing::learned_world().model);
+  for (ModelObject& object : model->objects)
+    if (object.name == "one") change(object);
+  return model;
+}
+
+TEST(Recognizer, MeasuresEachObjectByItsOwnThreshold) {
+  Recognizer recognize(with_changed_one([](ModelObject& one) { one.rejection_distance = 1e-9; }));
+  for (double angle = 5.0; angle < 360.0; angle += 60.0) {
+    const auto refused = recognize.recognize(testing::scene_with(1, angle));
+    ASSERT_EQ(refused.size(), 1U);
+    EXPECT_EQ(refused[0].verdict, Verdict::unknown);
+    EXPECT_EQ(refused[0].best->object, "one") << "the nearest is reported all the same";
+    EXPECT_EQ(refused[0].rejection_distance, 1e-9);
+    EXPECT_EQ(recognize.recognize(testing::scene_with(2, angle))[0].verdict, Verdict::recognized);
+  }
+}
+
+TEST(Recognizer, CallsARegionTooSmallByItsLargerSide) {
+  // The model's pictures have 32 pixels a side: a quarter of that is enough.
+  Recognizer recognize = recognizer();
+  const auto verdict_of = [&](int width, int height) {
+    cv::Mat scene = testing::empty_scene({}, 5);
+    cv::rectangle(scene, cv::Rect(70, 50, width, height), cv::Scalar(90, 180, 220), cv::FILLED);
+    const auto outcomes = recognize.recognize(scene);
+    EXPECT_EQ(outcomes.size(), 1U) << width << " x " << height;
+    return outcomes.empty() ? Verdict::unknown : outcomes[0].verdict;
+  };
+  EXPECT_EQ(verdict_of(6, 6), Verdict::too_small);
+  EXPECT_NE(verdict_of(6, 40), Verdict::too_small);
+  EXPECT_NE(verdict_of(40, 6), Verdict::too_small);
+}
+
+TEST(Recognizer, RefinesThePoseInTheObjectsOwnEigenspaceWithinItsBasinOnly) {
+  // The manifold of the object's own eigenspace, turned by whole steps of 15 degrees.
+  for (const int steps : {0, 1, 2, 12}) {
+    Recognizer recognize(with_changed_one([&](ModelObject& one) {
+      ObjectEigenspace& space = *one.space;
+      const auto axes = space.manifold.axes();
+      const std::size_t count = axes[0].samples.size();
+      Eigen::MatrixXd points(space.manifold.dimensions(), static_cast<Eigen::Index>(count));
+      for (std::size_t i = 0; i < count; ++i) {
+        const double from = axes[0].samples[(i + static_cast<std::size_t>(steps)) % count];
+        points.col(static_cast<Eigen::Index>(i)) = space.manifold.evaluate({&from, 1});
+      }
+      space.manifold = Manifold::interpolate({axes[0]}, points, space.manifold.degree());
+      space.better_pose = true;
+    }));
+    // One step is within the basin of one and a half; more is not.
+    const double turned = steps == 1 ? 15.0 : 0.0;
+    for (double angle = 20.0; angle < 360.0; angle += 75.0) {
+      const auto outcomes = recognize.recognize(testing::scene_with(1, angle));
+      ASSERT_EQ(outcomes.size(), 1U);
+      EXPECT_LT(std::abs(circular_difference(outcomes[0].best->q[0], angle - turned, 360.0)), 6.0)
+          << steps << " steps, at " << angle;
+    }
+  }
+}
+
+TEST(Recognizer, ReportsTheOtherPoseOfAnObjectThatLooksTheSameFromBehind) {
+  const test::TemporaryFolder folder;
+  testing::write_turn(folder.path(), "twice", 36,
+                      [](double angle, int seed) { return testing::scene_with(1, 2.0 * angle, {}, seed); });
+  testing::write_turn(folder.path(), "plain", 2, 36);
+  const auto sets = open_image_sets(folder.path());
+  Recognizer recognize(std::make_shared<const Model>(learn(all_views(sets), testing::small_learning())));
+  for (double angle = 4.0; angle < 360.0; angle += 45.0) {
+    const auto outcomes = recognize.recognize(testing::scene_with(1, 2.0 * angle, {}, 901));
+    ASSERT_EQ(outcomes.size(), 1U);
+    ASSERT_TRUE(outcomes[0].other_pose) << angle;
+    EXPECT_EQ(outcomes[0].other_pose->object, "twice");
+    const double apart = circular_difference(outcomes[0].other_pose->q[0], outcomes[0].best->q[0], 360.0);
+    EXPECT_NEAR(std::abs(apart), 180.0, 6.0) << angle;
+    EXPECT_FALSE(recognize.recognize(testing::scene_with(2, angle, {}, 902))[0].other_pose) << angle;
+  }
+}
+
+TEST(Recognizer, GivesTheBoxOfEachRegionInTheFrame) {
+  Recognizer recognize = recognizer();
+  SceneKnobs knobs;
+  knobs.width = 320;
+  knobs.x = 240.0;
+  knobs.y = 70.0;
+  const cv::Mat scene = testing::scene_with(2, 30.0, knobs);
+  cv::Mat grey;
+  cv::cvtColor(scene, grey, cv::COLOR_BGR2GRAY);
+  const cv::Rect truth = cv::boundingRect(grey > 40);
+  const auto outcomes = recognize.recognize(scene);
+  ASSERT_EQ(outcomes.size(), 1U);
+  const cv::Rect both = outcomes[0].box & truth;
+  EXPECT_GT(both.area(), 0.8 * (outcomes[0].box.area() + truth.area() - both.area()))
+      << outcomes[0].box << " and " << truth;
+}
+
 }  // namespace
 }  // namespace eigenpose

@@ -1,63 +1,67 @@
-// Objects that touch: told apart by their learned sizes.
+#include "core/recognition/touching_objects.h"
+
 #include <cmath>
 
 #include <gmock/gmock.h>
 
 #include "core/base/angle.h"
 #include "core/recognition/recognizer.h"
-#include "tests/support/learned_world.h"
+#include "tests/support/parts_world.h"
 
 namespace eigenpose {
 namespace {
 
 using testing::SceneKnobs;
 
-/// Three objects with windows, learned from scenes by a camera that stands still.
-struct PartsWorld {
-  PartsWorld() {
-    testing::write_turn(folder.path(), "one", 1, 36, knobs());
-    testing::write_turn(folder.path(), "two", 2, 36, knobs());
-    testing::write_turn(folder.path(), "three", 3, 36, knobs());
-    sets = open_image_sets(folder.path());
-    LearningOptions options = testing::small_learning();
-    options.normalization.size = 64;
-    options.parts = true;
-    model = std::make_shared<const Model>(learn(all_views(sets), options));
-  }
-  static SceneKnobs knobs() {
-    SceneKnobs knobs = SceneKnobs::centred(400, 300, 1.6);
-    knobs.x = 130.0;  // there is room for another beside it
-    return knobs;
-  }
-  test::TemporaryFolder folder;
-  std::vector<ImageSet> sets;
-  std::shared_ptr<const Model> model;
-};
+using testing::PartsWorld;
 
 const PartsWorld& world() {
-  static const PartsWorld made;
-  return made;
+  return testing::parts_world();
 }
 
+/// Where the only object of a scene stands.
+cv::Rect only_box(const cv::Mat& scene) {
+  Segmenter segmenter(world().model->normalization.segmentation);
+  const auto regions = segmenter.segment(scene);
+  return regions.size() == 1 ? regions[0].box : cv::Rect();
+}
+
+struct TouchingScene {
+  cv::Mat picture;
+  cv::Rect left;  ///< of each object, alone
+  cv::Rect right;
+};
+
 /// Two objects side by side, moved together until they are one region.
-cv::Mat touching(int left, double left_angle, int right, double right_angle, Recognizer& recognize) {
-  SceneKnobs a = PartsWorld::knobs();
+TouchingScene touching_scene(int left, double left_angle, int right, double right_angle) {
+  const SceneKnobs a = PartsWorld::knobs();
   SceneKnobs b = a;
   for (b.x = a.x + 160.0;; b.x -= 2.0) {
-    cv::Mat scene = testing::scene_with(left, left_angle, a);
-    testing::draw_object(scene, right, right_angle, b);
-    Segmenter segmenter(recognize.model().normalization.segmentation);
-    if (segmenter.segment(scene).size() < 2) return scene;
+    TouchingScene scene{testing::scene_with(left, left_angle, a), {}, {}};
+    testing::draw_object(scene.picture, right, right_angle, b);
+    Segmenter segmenter(world().model->normalization.segmentation);
+    if (segmenter.segment(scene.picture).size() > 1) continue;
+    scene.left = only_box(testing::scene_with(left, left_angle, a));
+    scene.right = only_box(testing::scene_with(right, right_angle, b));
+    return scene;
   }
 }
 
-TEST(TouchingObjects, TellsTouchingObjectsApart) {
+cv::Mat touching(int left, double left_angle, int right, double right_angle) {
+  return touching_scene(left, left_angle, right, right_angle).picture;
+}
+
+double union_share(const cv::Rect& a, const cv::Rect& b) {
+  return static_cast<double>((a & b).area()) / (a.area() + b.area() - (a & b).area());
+}
+
+TEST(TouchingObjects, AreSplit) {
   Recognizer recognize(world().model);
   int right = 0;
   int pairs = 0;
   for (double angle = 5.0; angle < 360.0; angle += 50.0) {
     ++pairs;
-    const auto outcomes = recognize.recognize(touching(1, angle, 2, angle + 65.0, recognize));
+    const auto outcomes = recognize.recognize(touching(1, angle, 2, angle + 65.0));
     if (outcomes.size() != 2) continue;
     const bool swapped = outcomes[0].box.x > outcomes[1].box.x;
     const Outcome& left = outcomes[swapped ? 1 : 0];
@@ -73,7 +77,7 @@ TEST(TouchingObjects, TellsTouchingObjectsApart) {
   EXPECT_GE(right, pairs - 2) << "of " << pairs;
 }
 
-TEST(PartsStage, IsLessSureTheMoreIsCovered) {
+TEST(PartsStage, IsLessConfidentTheMoreIsOccluded) {
   Recognizer recognize(world().model);
   double last = 1.0;
   double least = 1.0;
@@ -104,14 +108,14 @@ TEST(PartsStage, IsLessSureTheMoreIsCovered) {
   EXPECT_LT(last, 0.9);
 }
 
-TEST(TouchingObjects, DoesWithoutTheSizesOfObjectsThatCameReadyCut) {
+TEST(TouchingObjects, AreSplitWithoutTheSizesOfObjectsThatCameReadyCut) {
   Model model = *world().model;
   auto parts = std::make_shared<PartsModel>(*model.parts);
   ASSERT_EQ(model.objects[1].name, "three");
   for (cv::Size& size : parts->extents[1]) size = {};
   model.parts = parts;
   Recognizer recognize(std::make_shared<const Model>(model));
-  const cv::Mat scene = touching(1, 5.0, 2, 70.0, recognize);
+  const cv::Mat scene = touching(1, 5.0, 2, 70.0);
   const auto outcomes = recognize.recognize(scene);
   ASSERT_EQ(outcomes.size(), 2U);
   EXPECT_EQ(outcomes[0].best->object, "one");
@@ -130,40 +134,110 @@ TEST(TouchingObjects, LeavesAnObjectThatStandsNearerThanItWasLearnedInOnePiece) 
   }
 }
 
-TEST(TouchingObjects, LeavesStrangersInOnePiece) {
+TEST(TouchingObjects, LeavesUnknownObjectsInOnePiece) {
   Recognizer recognize(world().model);
   int taken_apart = 0;
   for (int kind = 20; kind < 32; ++kind) {
     SceneKnobs knobs = PartsWorld::knobs();
     knobs.scale = 2.4;  // large enough for two
     const auto outcomes = recognize.recognize(testing::scene_with(kind, 30.0 * kind, knobs));
-    if (outcomes.size() == 1U)
+    if (outcomes.size() == 1U) {
       EXPECT_EQ(outcomes[0].verdict, Verdict::unknown);
-    else
+    } else
       ++taken_apart;
   }
   EXPECT_LE(taken_apart, 1) << "of 12; made-up objects are much alike";
 }
 
-TEST(TouchingObjects, AKnownObjectIsToldBesideAStranger) {
+TEST(TouchingObjects, ReportsAKnownObjectBesideAnUnknownOne) {
   Recognizer recognize(world().model);
   int told = 0;
   int shown = 0;
   for (double angle = 5.0; angle < 360.0; angle += 45.0) {
     ++shown;
     bool known = false;
-    bool stranger = false;
-    for (const Outcome& outcome : recognize.recognize(touching(1, angle, 25, 40.0, recognize))) {
-      stranger = stranger || outcome.verdict == Verdict::unknown;
+    bool unknown = false;
+    for (const Outcome& outcome : recognize.recognize(touching(1, angle, 25, 40.0))) {
+      unknown = unknown || outcome.verdict == Verdict::unknown;
       if (outcome.verdict != Verdict::recognized) continue;
       known = true;
       EXPECT_EQ(outcome.best->object, "one");
       EXPECT_LT(std::abs(circular_difference(outcome.best->q[0], angle, 360.0)), 15.0);
     }
-    EXPECT_TRUE(stranger) << angle;
+    EXPECT_TRUE(unknown) << angle;
     told += known ? 1 : 0;
   }
   EXPECT_GE(told, shown / 2) << "of " << shown;
+}
+
+TEST(TouchingObjects, GetTheBoxesInWhichTheyStand) {
+  Recognizer recognize(world().model);
+  int split = 0;
+  for (double angle = 5.0; angle < 360.0; angle += 50.0) {
+    const TouchingScene scene = touching_scene(1, angle, 2, angle + 65.0);
+    for (const Outcome& outcome : recognize.recognize(scene.picture)) {
+      if (outcome.verdict != Verdict::recognized) continue;
+      ++split;
+      const cv::Rect& truth = outcome.best->object == "one" ? scene.left : scene.right;
+      EXPECT_GT(union_share(outcome.box, truth), 0.6)
+          << outcome.best->object << " at " << angle << ": " << outcome.box << ", it stands in " << truth;
+    }
+  }
+  EXPECT_GE(split, 10);
+}
+
+TEST(TouchingObjects, AreNotSplitWhereTheSearchIsStoppedAndTheOutcomeSaysSo) {
+  Recognizer recognize(world().model);
+  const cv::Mat scene = touching(1, 55.0, 2, 120.0);
+  const auto whole = recognize.recognize(scene);
+  ASSERT_EQ(whole.size(), 2U);
+  for (const Outcome& outcome : whole) EXPECT_FALSE(outcome.unfinished);
+  std::stop_source source;
+  source.request_stop();
+  RecognitionLimits stopped;
+  stopped.stop = source.get_token();
+  RecognitionLimits no_time;
+  no_time.region_time = Duration::zero();
+  for (const RecognitionLimits& limits : {stopped, no_time}) {
+    const auto outcomes = recognize.recognize(scene, limits);
+    ASSERT_EQ(outcomes.size(), 1U);
+    EXPECT_TRUE(outcomes[0].unfinished);
+    EXPECT_EQ(outcomes[0].verdict, Verdict::unknown);
+    // What needs no search is not touched by the limits.
+    const auto alone = recognize.recognize(testing::scene_with(1, 55.0, PartsWorld::knobs()), limits);
+    ASSERT_EQ(alone.size(), 1U);
+    EXPECT_EQ(alone[0].verdict, Verdict::recognized);
+    EXPECT_FALSE(alone[0].unfinished);
+  }
+  RecognitionLimits enough;
+  enough.region_time = std::chrono::hours(1);
+  EXPECT_EQ(recognize.recognize(scene, enough).size(), 2U);
+  EXPECT_EQ(recognize.recognize(scene).size(), 2U) << "limits hold for one call";
+}
+
+TEST(TouchingObjects, AreNotReportedWithoutEnoughEvidence) {
+  const cv::Mat scene = touching(1, 55.0, 2, 120.0);
+  Recognizer usual(world().model);
+  ASSERT_EQ(usual.recognize(scene).size(), 2U);
+  Recognizer strict(world().changed([](PartsModel& parts) { parts.covered_evidence = 1e6; }));
+  const auto outcomes = strict.recognize(scene);
+  ASSERT_EQ(outcomes.size(), 1U);
+  EXPECT_EQ(outcomes[0].verdict, Verdict::unknown);
+}
+
+TEST(TouchingObjects, DoNotReplaceAKnownObjectUnlessTheyExplainItsRegion) {
+  // The object was learned half as large, so that its region may hold two; it is one all the same.
+  const std::size_t one = world().index_of("one");
+  Recognizer recognize(world().changed([&](PartsModel& parts) {
+    for (cv::Size& size : parts.extents[one]) size = {size.width * 2 / 3, size.height * 2 / 3};
+    parts.covered_evidence = -1e6;  // whatever is found has enough evidence
+  }));
+  for (double angle = 5.0; angle < 360.0; angle += 60.0) {
+    const auto outcomes = recognize.recognize(testing::scene_with(1, angle, PartsWorld::knobs()));
+    bool unknown = false;
+    for (const Outcome& outcome : outcomes) unknown = unknown || outcome.verdict == Verdict::unknown;
+    EXPECT_FALSE(unknown) << "a part of the object is called unknown at " << angle;
+  }
 }
 
 }  // namespace

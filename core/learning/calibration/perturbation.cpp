@@ -1,0 +1,35 @@
+#include "core/learning/calibration/perturbation.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <opencv2/imgproc.hpp>
+
+namespace eigenpose {
+
+Misalignment Perturbation::draw(SeededRandom& random) const {
+  Misalignment m;
+  m.dx = shift * random.symmetric();
+  m.dy = shift * random.symmetric();
+  m.scale = scale * random.symmetric();
+  m.rotation = turn_deg * random.symmetric() * std::numbers::pi / 180.0;
+  return m;
+}
+
+cv::Mat displaced(const cv::Mat& picture, const Misalignment& by) {
+  const double enlarge = 1.0 + by.scale;
+  const double cosine = enlarge * std::cos(by.rotation);
+  const double sine = enlarge * std::sin(by.rotation);
+  const double x = 0.5 * picture.cols - 0.5;
+  const double y = 0.5 * picture.rows - 0.5;
+  const double dx = by.dx * picture.cols;
+  const double dy = by.dy * picture.cols;
+  const cv::Matx23d map(cosine, -sine, x + dx - cosine * x + sine * y, sine, cosine,
+                        y + dy - sine * x - cosine * y);
+  const int interpolation = picture.depth() == CV_16U ? cv::INTER_NEAREST : cv::INTER_LINEAR;
+  cv::Mat result;
+  cv::warpAffine(picture, result, map, picture.size(), interpolation, cv::BORDER_REPLICATE);
+  return result;
+}
+
+}  // namespace eigenpose

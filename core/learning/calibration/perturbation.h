@@ -1,0 +1,26 @@
+#pragma once
+
+/// Random misalignment, as imperfect segmentation causes it.
+
+#include <opencv2/core.hpp>
+
+#include "core/alignment/misalignment.h"
+#include "core/base/random.h"
+
+namespace eigenpose {
+
+/// How far a picture is displaced at random. Each unknown is uniform between minus and plus its bound.
+struct Perturbation {
+  double shift = 0.0;     ///< in x and in y; share of the picture's width
+  double scale = 0.0;     ///< 0.03 is ±3 %
+  double turn_deg = 0.0;  ///< in the picture's plane
+
+  /// One draw: four numbers of the sequence. Its gain is 0.
+  [[nodiscard]] Misalignment draw(SeededRandom& random) const;
+};
+
+/// `picture` with a misalignment applied, about its middle; beyond its edge it goes on as it ends. Bilinear;
+/// 16-bit pictures (ranges) take the nearest pixel, as a mean of distances with "not measured" is neither.
+cv::Mat displaced(const cv::Mat& picture, const Misalignment& by);
+
+}  // namespace eigenpose

@@ -1,0 +1,157 @@
+#include "core/learning/parts_learning.h"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/learning/calibration/occlusion_calibration.h"
+#include "core/learning/calibration/parts_calibration.h"
+#include "tests/support/drawn_pictures.h"
+#include "tests/support/serial_progress.h"
+
+namespace eigenpose {
+namespace {
+
+std::vector<PartsViews> turns(unsigned objects, double step) {
+  std::vector<PartsViews> views;
+  for (unsigned o = 0; o < objects; ++o)
+    views.push_back(test::turntable_views(test::DrawnObject(20 + o), step));
+  return views;
+}
+
+TEST(PartsLearning, TakesViewsAcrossTheSeamOfATurnForNeighbours) {
+  const PartsModel model = learn_parts(turns(1, 15.0), {});
+  const auto& near = model.objects[0].neighbours;
+  ASSERT_EQ(near.size(), 24U);
+  for (int v = 0; v < 24; ++v) {
+    EXPECT_EQ(near[static_cast<std::size_t>(v)], (std::array{(v + 1) % 24, (v + 23) % 24})) << v;
+  }
+}
+
+TEST(PartsLearning, GivesTheEndsOfAnOpenAxisOneNeighbour) {
+  PartsViews views = test::turntable_views(test::DrawnObject(20), 15.0);
+  views.axes[0].dof.periodic = false;
+  const auto near = learn_parts({views}, {}).objects[0].neighbours;
+  EXPECT_EQ(near.front(), (std::array{1, -1}));
+  EXPECT_EQ(near.back(), (std::array{-1, 22}));
+  EXPECT_EQ(near[7], (std::array{8, 6}));
+}
+
+TEST(PartsLearning, TakesNeighboursAlongTheFastestAxisOfAGrid) {
+  PartsViews views = test::turntable_views(test::DrawnObject(20), 15.0);
+  SampleAxis turn = views.axes[0];
+  turn.samples.resize(12);  // 2 × 12 × 1 views
+  views.axes = {
+      {{"light", "deg", 0.0, 90.0, false}, {0.0, 90.0}}, turn, {{"x", "mm", 0.0, 1.0, false}, {0.0}}};
+  const auto near = learn_parts({views}, {}).objects[0].neighbours;
+  EXPECT_EQ(near[0], (std::array{1, 11}));
+  EXPECT_EQ(near[11], (std::array{0, 10}));
+  EXPECT_EQ(near[12], (std::array{13, 23})) << "the second light has neighbours of its own";
+}
+
+TEST(PartsLearning, AddsForeshortenedAndMirroredCopiesOfSparseViews) {
+  PartsLearningOptions options;
+  options.threads = 1;
+  const PartsModel dense = learn_parts(turns(1, 20.0), options);
+  EXPECT_EQ(dense.objects[0].candidates.size(), 18U);
+  EXPECT_EQ(dense.objects[0].store.views(), 18U);
+  const PartsModel sparse = learn_parts(turns(1, 24.0), options);
+  const PartsObject& object = sparse.objects[0];
+  ASSERT_EQ(object.candidates.size(), 30U);
+  EXPECT_EQ(object.store.views(), 90U);
+  for (std::size_t c = 0; c < 30; ++c) {
+    EXPECT_EQ(object.candidates[c].mirrored, c >= 15);
+    EXPECT_EQ(object.candidates[c].view, static_cast<int>(c % 15));
+    // The neighbours of a mirrored view are mirrored, too.
+    for (const int n : object.neighbours[c]) EXPECT_EQ(n >= 15, c >= 15);
+  }
+  for (std::size_t lane = 0; lane < 90; ++lane) EXPECT_EQ(object.lane_candidate[lane], lane / 3);
+}
+
+TEST(PartsLearning, DoesNotDependOnThreadsNorDoItsCalibrations) {
+  const auto views = turns(4, 20.0);
+  std::vector<PartsModel> models;
+  std::vector<std::vector<OcclusionEvidence>> evidence;
+  for (const unsigned threads : {1U, 4U}) {
+    PartsLearningOptions options;
+    options.threads = threads;
+    PartsModel model = learn_parts(views, options);
+    PartsCalibrationOptions calibration;
+    calibration.threads = threads;
+    calibrate_parts(model, views, calibration);
+    OcclusionCalibrationOptions occlusion;
+    occlusion.views = 20;
+    occlusion.threads = threads;
+    evidence.push_back(measure_occlusion(model, views, occlusion));
+    models.push_back(std::move(model));
+  }
+  EXPECT_EQ(models[0].noise, models[1].noise);
+  EXPECT_EQ(models[0].smallest_rate, models[1].smallest_rate);
+  for (std::size_t o = 0; o < 4; ++o) {
+    EXPECT_EQ(models[0].objects[o].store.values(), models[1].objects[o].store.values());
+    EXPECT_EQ(models[0].poses[o].samples(), models[1].poses[o].samples());
+    const PartsCalibration& a = models[0].calibration[o];
+    const PartsCalibration& b = models[1].calibration[o];
+    EXPECT_EQ(a.rejection_score, b.rejection_score);
+    EXPECT_EQ(a.typical_score, b.typical_score);
+    EXPECT_EQ(a.covered_share, b.covered_share);
+    EXPECT_LT(a.typical_score, a.rejection_score);
+  }
+  ASSERT_EQ(evidence[0].size(), evidence[1].size());
+  for (std::size_t i = 0; i < evidence[0].size(); ++i) {
+    EXPECT_EQ(evidence[0][i].evidence, evidence[1][i].evidence);
+    EXPECT_EQ(evidence[0][i].taken_for, evidence[1][i].taken_for);
+    if (evidence[0][i].taken_for == evidence[0][i].object) {
+      EXPECT_TRUE(std::isinf(evidence[0][i].evidence)) << "it was shown to the other objects alone";
+    }
+  }
+}
+
+TEST(PartsLearning, ReportsProgressOneCallAtATime) {
+  const auto views = turns(6, 30.0);
+  test::SerialProgress heard;
+  PartsLearningOptions options;
+  options.threads = 4;
+  PartsModel model = learn_parts(views, options, heard.listener());
+  PartsCalibrationOptions calibration;
+  calibration.threads = 4;
+  calibrate_parts(model, views, calibration, heard.listener());
+  OcclusionCalibrationOptions occlusion;
+  occlusion.views = 40;
+  occlusion.threads = 4;
+  measure_occlusion(model, views, occlusion, heard.listener());
+  heard.expect_complete();
+}
+
+TEST(PartsLearning, EndsWhenAskedTo) {
+  std::stop_source source;
+  source.request_stop();
+  const auto views = turns(2, 30.0);
+  EXPECT_THROW(learn_parts(views, {}, {}, source.get_token()), Interrupted);
+  PartsModel model = learn_parts(views, {});
+  EXPECT_THROW(calibrate_parts(model, views, {}, {}, source.get_token()), Interrupted);
+  EXPECT_THROW(measure_occlusion(model, views, {}, {}, source.get_token()), Interrupted);
+}
+
+TEST(PartsLearning, RefusesObjectsWithoutViews) {
+  EXPECT_THROW(learn_parts({}, {}), std::invalid_argument);
+  EXPECT_THROW(learn_parts({PartsViews{}}, {}), std::invalid_argument);
+}
+
+TEST(PartsCalibration, IsStricterTheHigherTheRateOfFalseRejections) {
+  const auto views = turns(3, 20.0);
+  PartsModel model = learn_parts(views, {});
+  double before = 2.0;
+  for (const double rate : {0.0, 0.05, 0.3}) {
+    PartsCalibrationOptions options;
+    options.rate = rate;
+    calibrate_parts(model, views, options);
+    EXPECT_LT(model.calibration[1].rejection_score, before) << rate;
+    before = model.calibration[1].rejection_score;
+  }
+  EXPECT_DOUBLE_EQ(model.smallest_rate, 1.0 / (3 * 18 + 1));
+}
+
+}  // namespace
+}  // namespace eigenpose
