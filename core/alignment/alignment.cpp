@@ -9,7 +9,7 @@
 
 #include "core/base/insertion_sort.h"
 #include "core/manifold/pose_covariance.h"
-#include "core/simd/dense_kernels.h"
+#include "core/simd/dense_products.h"
 
 namespace eigenpose {
 namespace {

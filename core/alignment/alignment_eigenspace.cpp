@@ -9,10 +9,10 @@
 #include <string>
 #include <utility>
 
-#include <emmintrin.h>
 #include <opencv2/imgproc.hpp>
 
 #include "core/base/linear_algebra.h"
+#include "core/simd/similarity_warp.h"
 
 namespace eigenpose {
 namespace {
@@ -21,40 +21,6 @@ constexpr int coarse_side = 32;
 constexpr int fine_side = 48;        // finer gains nothing and costs memory: 0.3 MB for 36 views
 constexpr double coarse_blur = 1.5;  // pixels of the 64×64 picture
 constexpr std::size_t most_samples = 4096;
-
-/// Brightness and differences together at any place; outside its edge the picture goes on as it ends. Four
-/// floats a register: SSE2 is in every x86-64.
-struct Sampler {
-  const float* texels;
-
-  /// Samples four places.
-  void four(__m128 x, __m128 y, __m128 (&samples)[4]) const {
-    const __m128 last = _mm_set1_ps(static_cast<float>(PosePicture::side - 1));
-    const __m128 before_last = _mm_set1_ps(static_cast<float>(PosePicture::side - 2));
-    x = _mm_min_ps(_mm_max_ps(x, _mm_setzero_ps()), last);
-    y = _mm_min_ps(_mm_max_ps(y, _mm_setzero_ps()), last);
-    const __m128i column = _mm_cvttps_epi32(_mm_min_ps(x, before_last));
-    const __m128i row = _mm_cvttps_epi32(_mm_min_ps(y, before_last));
-    alignas(16) std::array<float, 4> fx;
-    alignas(16) std::array<float, 4> fy;
-    alignas(16) std::array<std::int32_t, 4> at;
-    _mm_store_ps(fx.data(), _mm_sub_ps(x, _mm_cvtepi32_ps(column)));
-    _mm_store_ps(fy.data(), _mm_sub_ps(y, _mm_cvtepi32_ps(row)));
-    static_assert(PosePicture::side == 1 << 6);
-    _mm_store_si128(reinterpret_cast<__m128i*>(at.data()), _mm_add_epi32(_mm_slli_epi32(row, 6), column));
-    constexpr std::ptrdiff_t next_row = std::ptrdiff_t{4} * PosePicture::side;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const float* p = texels + std::ptrdiff_t{4} * at[k];
-      const __m128 across = _mm_set1_ps(fx[k]);
-      const __m128 left = _mm_loadu_ps(p);
-      const __m128 below = _mm_loadu_ps(p + next_row);
-      const __m128 top = _mm_add_ps(left, _mm_mul_ps(across, _mm_sub_ps(_mm_loadu_ps(p + 4), left)));
-      const __m128 bottom =
-          _mm_add_ps(below, _mm_mul_ps(across, _mm_sub_ps(_mm_loadu_ps(p + next_row + 4), below)));
-      samples[k] = _mm_add_ps(top, _mm_mul_ps(_mm_set1_ps(fy[k]), _mm_sub_ps(bottom, top)));
-    }
-  }
-};
 
 using Brightness = std::array<float, std::size_t{PosePicture::side} * PosePicture::side>;
 
@@ -174,55 +140,34 @@ void make_pose_picture(const cv::Mat& picture, PosePicture& out) {
 
 void PoseScale::warp(const PosePicture& picture, const Misalignment& misalignment, bool derivatives,
                      Eigen::MatrixXf& out) const {
-  const Sampler sampler{side > coarse_side ? picture.sharp.data() : picture.blurred.data()};
+  const GradientPicture gradients{side > coarse_side ? picture.sharp.data() : picture.blurred.data(),
+                                  PosePicture::side};
   const auto n = static_cast<float>(PosePicture::side);
-  const float step = n / static_cast<float>(side);
   const float enlarge = static_cast<float>(1.0 + misalignment.scale);
-  const float cosine = enlarge * static_cast<float>(std::cos(misalignment.rotation));
-  const float sine = enlarge * static_cast<float>(std::sin(misalignment.rotation));
   const float middle = 0.5F * n;
-  const float cx = middle + n * static_cast<float>(misalignment.dx) - 0.5F;
-  const float cy = middle + n * static_cast<float>(misalignment.dy) - 0.5F;
+  const SimilaritySampling sampling{side,
+                                    n / static_cast<float>(side),
+                                    middle,
+                                    middle + n * static_cast<float>(misalignment.dx) - 0.5F,
+                                    middle + n * static_cast<float>(misalignment.dy) - 0.5F,
+                                    enlarge * static_cast<float>(std::cos(misalignment.rotation)),
+                                    enlarge * static_cast<float>(std::sin(misalignment.rotation))};
   out.resize(static_cast<Eigen::Index>(side) * side, 1 + Misalignment::unknowns);
-  float* value = out.col(0).data();
-  float* by_gain = out.col(1).data();
-  float* by_x = out.col(2).data();
-  float* by_y = out.col(3).data();
-  float* by_scale = out.col(4).data();
-  float* by_rotation = out.col(5).data();
-  // Four neighbouring pixels at a time.
-  static_assert(coarse_side % 4 == 0 && fine_side % 4 == 0);
-  const __m128 shrink = _mm_set1_ps(1.0F / enlarge);
-  int i = 0;
-  for (int r = 0; r < side; ++r) {
-    const float v = (static_cast<float>(r) + 0.5F) * step - middle;
-    for (int c = 0; c < side; c += 4, i += 4) {
-      const __m128 u = _mm_add_ps(_mm_set1_ps((static_cast<float>(c) + 0.5F) * step - middle),
-                                  _mm_mul_ps(_mm_set1_ps(step), _mm_setr_ps(0.0F, 1.0F, 2.0F, 3.0F)));
-      const __m128 du = _mm_sub_ps(_mm_mul_ps(_mm_set1_ps(cosine), u), _mm_set1_ps(sine * v));
-      const __m128 dv = _mm_add_ps(_mm_mul_ps(_mm_set1_ps(sine), u), _mm_set1_ps(cosine * v));
-      __m128 samples[4];
-      sampler.four(_mm_add_ps(_mm_set1_ps(cx), du), _mm_add_ps(_mm_set1_ps(cy), dv), samples);
-      _MM_TRANSPOSE4_PS(samples[0], samples[1], samples[2], samples[3]);
-      const __m128 gx = samples[1];
-      const __m128 gy = samples[2];
-      _mm_storeu_ps(value + i, samples[0]);
-      if (derivatives) {
-        _mm_storeu_ps(by_x + i, _mm_mul_ps(_mm_set1_ps(n), gx));
-        _mm_storeu_ps(by_y + i, _mm_mul_ps(_mm_set1_ps(n), gy));
-        _mm_storeu_ps(by_scale + i, _mm_mul_ps(_mm_add_ps(_mm_mul_ps(gx, du), _mm_mul_ps(gy, dv)), shrink));
-        _mm_storeu_ps(by_rotation + i, _mm_sub_ps(_mm_mul_ps(gy, du), _mm_mul_ps(gx, dv)));
-      }
-    }
+  if (derivatives) {
+    sample_similarity(gradients, sampling, out.col(0).data(),
+                      {out.col(2).data(), out.col(3).data(), out.col(4).data(), out.col(5).data()});
+  } else {
+    sample_similarity(gradients, sampling, out.col(0).data());
   }
   const float energy = out.col(0).norm();
-  const float scale = static_cast<float>(1.0 + misalignment.gain) / std::max(energy, 1e-9F);
+  const auto gain = static_cast<float>(1.0 + misalignment.gain);
+  const float scale = gain / std::max(energy, 1e-9F);
   out.col(0) *= scale;
   if (derivatives) {
-    out.rightCols(4) *= scale;
-    for (Eigen::Index k = 0; k < out.rows(); ++k) {
-      by_gain[k] = value[k] / static_cast<float>(1.0 + misalignment.gain);
-    }
+    out.col(1) = out.col(0) / gain;
+    out.middleCols(2, 2) *= scale * n;  // the shift is in sides of the picture
+    out.col(4) *= scale / enlarge;      // the scale itself, not its logarithm
+    out.col(5) *= scale;
   }
 }
 

@@ -8,7 +8,7 @@
 
 #include "core/base/statistics.h"
 #include "core/manifold/pose_covariance.h"
-#include "core/simd/dense_kernels.h"
+#include "core/simd/dense_products.h"
 
 namespace eigenpose {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/simd/dense_kernels.h"
+#include "core/simd/dense_products.h"
 
 namespace eigenpose {
 namespace {

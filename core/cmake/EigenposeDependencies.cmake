@@ -10,6 +10,7 @@ find_package(PNG REQUIRED)
 find_package(nlohmann_json REQUIRED)
 # "hdf5" may mean the MPI build; this name is always the plain one.
 pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5-serial)
+pkg_check_modules(HIGHWAY REQUIRED IMPORTED_TARGET libhwy)
 
 # Debian's flann.pc asks for the MPI build of HDF5 beside the serial one that models are kept in; two HDF5 in one process
 # must not be. Of FLANN only headers and its serialisation's LZ4 are used.

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "core/image/image_type.h"
-#include "core/simd/normalization_kernels.h"
+#include "core/simd/pixel_arithmetic.h"
 
 namespace eigenpose {
 namespace {
@@ -209,7 +209,7 @@ float Normalizer::normalize(const cv::Mat& cut, const std::array<std::uint8_t, 3
       const float measured = depths_[2 * i + 1];
       picture[i] = measured >= least_measured ? depths_[2 * i] / measured : 0.0F;
     }
-  return std::sqrt(energy_of(picture.data(), picture.size()));
+  return std::sqrt(sum_of_squares(picture.data(), picture.size()));
 }
 
 void shrink_appearance(std::span<const float> appearance, int size, int bands, int side,

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/image/background.h"
-#include "core/simd/threshold_kernels.h"
+#include "core/simd/threshold.h"
 
 namespace eigenpose {
 namespace {

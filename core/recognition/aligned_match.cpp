@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/alignment/misalignment.h"
-#include "core/simd/projection_kernel.h"
+#include "core/simd/projection.h"
 
 namespace eigenpose {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/simd/projection_kernel.h"
+#include "core/simd/projection.h"
 
 namespace eigenpose {
 

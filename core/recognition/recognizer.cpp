@@ -16,7 +16,7 @@
 #include "core/recognition/parts_stage.h"
 #include "core/search/pattern_rejector.h"
 #include "core/search/search.h"
-#include "core/simd/projection_kernel.h"
+#include "core/simd/projection.h"
 
 namespace eigenpose {
 namespace {

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "core/search/best_list.h"
-#include "core/simd/box_kernels.h"
 
 namespace eigenpose {
 
@@ -84,8 +83,7 @@ void arrange(std::span<std::uint32_t> order, std::size_t group, std::span<const 
 
 }  // namespace
 
-TreeSearch::TreeSearch(std::span<const Manifold> manifolds, BoxKernel kernel)
-    : ManifoldSearch(manifolds), patches_(manifolds), kernel_(kernel != nullptr ? kernel : box_kernel()) {
+TreeSearch::TreeSearch(std::span<const Manifold> manifolds) : ManifoldSearch(manifolds), patches_(manifolds) {
   build(patch_boxes(patches_));
 }
 
@@ -156,8 +154,9 @@ void TreeSearch::run(const float* point, const double* exact, BestList& best) co
     BoxDistances distances;
     const std::uint32_t used = node.count == box_lanes ? 0xFFFFU : (1U << node.count) - 1U;
     const bool inner = entry.node < first_leaf_;
-    const std::uint32_t mask =
-        kernel_(slices_.data() + entry.node * dims, point, dims, within, inner, distances) & used;
+    const BoxSlice* slices = slices_.data() + entry.node * dims;
+    const std::uint32_t mask = used & (inner ? ordered_box_distances(slices, point, dims, within, distances)
+                                             : box_distances(slices, point, dims, within, distances));
     const float* order = inner ? distances.order : distances.squared;
     std::array<std::uint8_t, box_lanes> lanes;
     std::size_t count = 0;

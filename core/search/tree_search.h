@@ -15,16 +15,14 @@
 
 #include "core/search/patch_set.h"
 #include "core/search/search.h"
-#include "core/simd/box_kernel.h"
+#include "core/simd/box_distances.h"
 
 namespace eigenpose {
 
 /// The default search. Memory: 2·K floats per patch for the boxes, and the scalars of PatchSet.
 class TreeSearch final : public ManifoldSearch {
  public:
-  explicit TreeSearch(std::span<const Manifold> manifolds) : TreeSearch(manifolds, nullptr) {}
-  /// @param kernel one of box_kernels(), or nullptr for the fastest.
-  TreeSearch(std::span<const Manifold> manifolds, BoxKernel kernel);
+  explicit TreeSearch(std::span<const Manifold> manifolds);
 
   [[nodiscard]] std::size_t nearest_into(
       const Eigen::Ref<const Eigen::VectorXf>& point, std::span<ClosestPoint> results,
@@ -41,7 +39,6 @@ class TreeSearch final : public ManifoldSearch {
   void build(std::span<const float> boxes);
 
   PatchSet patches_;
-  BoxKernel kernel_;
   std::size_t first_leaf_ = 0;        ///< nodes from here on have patches as children
   std::vector<Node> nodes_;           ///< level by level, the root first
   std::vector<BoxSlice> slices_;      ///< K per node

@@ -9,6 +9,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/work_meter.h"
+#include "core/simd/gram_products.h"
 #include "core/subspace/view_reader.h"
 
 namespace eigenpose {
@@ -24,28 +25,29 @@ std::size_t round_up(std::size_t value, std::size_t step) {
 }
 
 /// A stretch of numbers of every view of a block, as 16-bit words, the rest of the tile zero.
-void pack_words(const Kernels& kernels, const ViewBlock& block, std::size_t offset, std::size_t length,
+void pack_words(const ViewBlock& block, std::size_t offset, std::size_t length,
                 std::vector<std::int16_t>& packed) {
   const std::size_t padded = round_up(length, 16);
   for (std::size_t v = 0; v < kTile; ++v) {
     std::int16_t* row = packed.data() + v * kByteBlock;
     const std::size_t used = v < block.count ? length : 0;
-    if (used > 0) kernels.widen(block.bytes + v * block.length + offset, used, row);
+    if (used > 0) widen_bytes(block.bytes + v * block.length + offset, used, row);
     std::fill(row + used, row + padded, std::int16_t{0});
   }
 }
 
-void byte_tile(const Kernels& kernels, const ViewBlock& a, const ViewBlock& b,
-               Eigen::Ref<Eigen::MatrixXd> out) {
+void byte_tile(const ViewBlock& a, const ViewBlock& b, Eigen::Ref<Eigen::MatrixXd> out) {
   std::vector<std::int16_t> left(kTile * kByteBlock);
   std::vector<std::int16_t> right(kTile * kByteBlock);
   std::vector<std::int64_t> sums(kTile * kTile, 0);
   for (std::size_t k = 0; k < a.length; k += kByteBlock) {
     const std::size_t n = std::min(kByteBlock, a.length - k);
-    pack_words(kernels, a, k, n, left);
-    pack_words(kernels, b, k, n, right);
-    kernels.word_dots(left.data(), kByteBlock, round_up(a.count, 3), right.data(), kByteBlock,
-                      round_up(b.count, 4), round_up(n, 16), sums.data(), kTile);
+    pack_words(a, k, n, left);
+    pack_words(b, k, n, right);
+    // Zero rows and words up to whole steps of the kernel cost less than its edges.
+    add_inner_products(Rows<std::int16_t>{left.data(), kByteBlock, round_up(a.count, 3)},
+                       Rows<std::int16_t>{right.data(), kByteBlock, round_up(b.count, 4)}, round_up(n, 16),
+                       Sums<std::int64_t>{sums.data(), kTile});
   }
   for (std::size_t j = 0; j < b.count; ++j) {
     for (std::size_t i = 0; i < a.count; ++i) {
@@ -55,8 +57,7 @@ void byte_tile(const Kernels& kernels, const ViewBlock& a, const ViewBlock& b,
   }
 }
 
-void float_tile(const Kernels& kernels, const ViewBlock& a, const ViewBlock& b,
-                Eigen::Ref<Eigen::MatrixXd> out) {
+void float_tile(const ViewBlock& a, const ViewBlock& b, Eigen::Ref<Eigen::MatrixXd> out) {
   std::vector<double> left(kTile * kFloatBlock);
   std::vector<double> right(kTile * kFloatBlock);
   std::vector<double> sums(kTile * kTile, 0.0);
@@ -64,8 +65,8 @@ void float_tile(const Kernels& kernels, const ViewBlock& a, const ViewBlock& b,
     const std::size_t n = std::min(kFloatBlock, a.length - k);
     for (std::size_t v = 0; v < a.count; ++v) a.widen(v, k, n, left.data() + v * kFloatBlock);
     for (std::size_t v = 0; v < b.count; ++v) b.widen(v, k, n, right.data() + v * kFloatBlock);
-    kernels.dots(left.data(), kFloatBlock, a.count, right.data(), kFloatBlock, b.count, n, sums.data(),
-                 kTile);
+    add_inner_products(Rows<double>{left.data(), kFloatBlock, a.count},
+                       Rows<double>{right.data(), kFloatBlock, b.count}, n, Sums<double>{sums.data(), kTile});
   }
   for (std::size_t j = 0; j < b.count; ++j) {
     for (std::size_t i = 0; i < a.count; ++i) {
@@ -134,7 +135,6 @@ void tiled_products(const Stretch& rows, const Stretch& columns, Tiles wanted, c
                     Eigen::Ref<Eigen::MatrixXd> out, WorkMeter& meter) {
   const ViewBlock& a = rows.views;
   const ViewBlock& b = columns.views;
-  const Kernels& kernels = options.kernels != nullptr ? *options.kernels : best_kernels();
   std::vector<TilePair> tiles;
   for (std::size_t column = 0; column * kTile < b.count; ++column) {
     for (std::size_t row = wanted == Tiles::lower_triangle ? column : 0; row * kTile < a.count; ++row)
@@ -152,9 +152,9 @@ void tiled_products(const Stretch& rows, const Stretch& columns, Tiles wanted, c
       return;
     }
     if (left.bytes != nullptr) {
-      byte_tile(kernels, left, right, target);
+      byte_tile(left, right, target);
     } else {
-      float_tile(kernels, left, right, target);
+      float_tile(left, right, target);
     }
     meter.finished(1);
   });

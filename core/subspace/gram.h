@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 
 #include "core/base/progress.h"
-#include "core/simd/product_kernels.h"
 #include "core/subspace/appearance_source.h"
 
 namespace eigenpose {
@@ -29,13 +28,12 @@ struct KnownProducts {
 struct GramOptions {
   unsigned threads = 0;         ///< 0 means all cores; the result does not depend on it
   std::size_t tile_memory = 0;  ///< bytes for views read from a source that is not resident; 0 means no limit
-  const Kernels* kernels = nullptr;      ///< null means the fastest of this machine
   const KnownProducts* known = nullptr;  ///< taken from here where they stand there
 };
 
 /// All inner products of a source's views, unscaled where they are bytes: M × M, full and symmetric; exact
 /// integers for bytes, sums in double for floats. Every entry depends on its two views alone: not on threads,
-/// tiles, order, or (in floats too) the kernels. Cost
+/// tiles, order, or (in floats too) the SIMD target. Cost
 /// M²N/2 multiplications, 8M² bytes, and the views once if `tile_memory` holds them all; if it holds the
 /// share 1/s of them, about (s+1)/2 times. @throws std::invalid_argument when `tile_memory` holds fewer than
 /// two views, or known products do not fit the source; Interrupted.

@@ -7,6 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/parallel.h"
+#include "core/simd/gram_products.h"
 #include "core/subspace/back_projection.h"
 #include "core/subspace/block_krylov.h"
 #include "core/subspace/gram.h"
@@ -21,7 +22,6 @@ constexpr Eigen::Index kKrylovVectors = 400;
 SymmetricProduct matrix_product(const Eigen::MatrixXd& matrix, unsigned threads) {
   return [&matrix, threads](const Eigen::MatrixXd& x, Eigen::MatrixXd& y) {
     constexpr std::size_t kRows = 48;
-    const Kernels& kernels = best_kernels();
     const auto size = static_cast<std::size_t>(matrix.rows());
     const auto columns = static_cast<std::size_t>(x.cols());
     y.setZero();
@@ -29,8 +29,8 @@ SymmetricProduct matrix_product(const Eigen::MatrixXd& matrix, unsigned threads)
       const std::size_t first = job * kRows;
       const std::size_t n = std::min(kRows, size - first);
       Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(x.cols(), static_cast<Eigen::Index>(n));
-      kernels.dots(matrix.data() + first * size, size, n, x.data(), size, columns, size, rows.data(),
-                   columns);
+      add_inner_products(Rows<double>{matrix.data() + first * size, size, n},
+                         Rows<double>{x.data(), size, columns}, size, Sums<double>{rows.data(), columns});
       y.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(n)) = rows.transpose();
     });
   };
@@ -72,7 +72,7 @@ Eigenspace solve_gram(const SolverTask& task, SolverReport& report) {
   const std::size_t tiles = options.memory_limit > 0 ? options.memory_limit - fixed : 0;
   const SteadyClock clock;
   const TimePoint start = clock.now();
-  const GramOptions gram_options{options.threads, tiles, nullptr, options.known};
+  const GramOptions gram_options{options.threads, tiles, options.known};
   Eigen::MatrixXd gram = gram_matrix(source, gram_options, task.progress, task.stop);
   if (options.keep_products) options.keep_products(gram);
   const TimePoint solving = clock.now();

@@ -5,7 +5,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/work_meter.h"
-#include "core/simd/product_kernels.h"
+#include "core/simd/gram_products.h"
 #include "core/subspace/sta_code.h"
 
 namespace eigenpose {
@@ -66,7 +66,6 @@ class Differences {
 /// them: to the columns of the former, above the diagonal.
 void add_position(const CodedPosition& position, std::size_t first, std::size_t last,
                   Differences& differences, MatrixXd& steps) {
-  const Kernels& kernels = best_kernels();
   const auto& blocks = position.superblocks;
   const auto begins_by = [&](std::size_t view) {
     return static_cast<std::size_t>(
@@ -88,8 +87,9 @@ void add_position(const CodedPosition& position, std::size_t first, std::size_t 
       const std::size_t width = std::min(row_width, differences.width(j, columns));
       if (width == 0) continue;
       std::fill(values.begin(), values.end(), 0);
-      kernels.word_dots(differences.row(i), stride, (rows + 2) / 3 * 3, differences.row(j), stride,
-                        (columns + 3) / 4 * 4, width, values.data(), kColumns);
+      add_inner_products(Rows<std::int16_t>{differences.row(i), stride, (rows + 2) / 3 * 3},
+                         Rows<std::int16_t>{differences.row(j), stride, (columns + 3) / 4 * 4}, width,
+                         Sums<std::int64_t>{values.data(), kColumns});
       for (std::size_t r = 0; r < rows; ++r) {
         double* column = &steps(0, *differences.view(i + r));
         const Index* view = differences.view(j);

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
-#include "core/simd/product_kernels.h"
+#include "core/simd/gram_products.h"
 
 namespace eigenpose {
 namespace {
@@ -17,7 +17,6 @@ constexpr std::size_t kStretch = 512;  ///< numbers of a view packed at once the
 
 void add_weighted_views(const ViewBlock& block, const Eigen::MatrixXd& weights, std::size_t first,
                         unsigned threads, Eigen::MatrixXd& out) {
-  const Kernels& kernels = best_kernels();
   const auto rows = static_cast<std::size_t>(weights.cols());
   const auto stride = static_cast<std::size_t>(weights.rows());
   parallel_for((block.length + kPixels - 1) / kPixels, threads, [&](std::size_t job) {
@@ -32,8 +31,8 @@ void add_weighted_views(const ViewBlock& block, const Eigen::MatrixXd& weights, 
     for (std::size_t view = 0; view < block.count; view += kViewDepth) {
       const std::size_t depth = std::min(kViewDepth, block.count - view);
       for (std::size_t v = 0; v < depth; ++v) block.widen(view + v, pixel, n, packed.data() + v * kPixels);
-      kernels.combine(weights.data() + first + view, stride, rows, packed.data(), kPixels, depth, kPixels,
-                      sums.data(), kPixels);
+      add_combinations({weights.data() + first + view, stride, rows}, {packed.data(), kPixels, depth},
+                       kPixels, {sums.data(), kPixels});
     }
     for (std::size_t r = 0; r < rows; ++r) {
       std::copy_n(sums.data() + r * kPixels, n, out.data() + r * block.length + pixel);
@@ -42,7 +41,6 @@ void add_weighted_views(const ViewBlock& block, const Eigen::MatrixXd& weights, 
 }
 
 Eigen::MatrixXd view_products(const ViewBlock& block, const Eigen::MatrixXd& vectors, unsigned threads) {
-  const Kernels& kernels = best_kernels();
   const auto columns = static_cast<std::size_t>(vectors.cols());
   Eigen::MatrixXd out(static_cast<Eigen::Index>(block.count), vectors.cols());
   parallel_for((block.count + kJobViews - 1) / kJobViews, threads, [&](std::size_t job) {
@@ -53,8 +51,9 @@ Eigen::MatrixXd view_products(const ViewBlock& block, const Eigen::MatrixXd& vec
     for (std::size_t k = 0; k < block.length; k += kStretch) {
       const std::size_t width = std::min(kStretch, block.length - k);
       for (std::size_t v = 0; v < n; ++v) block.widen(first + v, k, width, packed.data() + v * kStretch);
-      kernels.dots(packed.data(), kStretch, n, vectors.data() + k, block.length, columns, width, sums.data(),
-                   columns);
+      add_inner_products(Rows<double>{packed.data(), kStretch, n},
+                         Rows<double>{vectors.data() + k, block.length, columns}, width,
+                         Sums<double>{sums.data(), columns});
     }
     out.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(n)) = sums.transpose();
   });

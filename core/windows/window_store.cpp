@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/simd/window_kernels.h"
+#include "core/simd/window_scores.h"
 
 namespace eigenpose {
 namespace {

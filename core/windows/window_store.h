@@ -15,7 +15,7 @@
 
 #include <Eigen/Core>
 
-#include "core/simd/window_kernels.h"
+#include "core/simd/window_scores.h"
 #include "core/windows/windows.h"
 
 namespace eigenpose {

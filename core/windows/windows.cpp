@@ -9,7 +9,7 @@
 #include "core/base/linear_algebra.h"
 #include "core/base/parallel.h"
 #include "core/base/statistics.h"
-#include "core/simd/dense_kernels.h"
+#include "core/simd/dense_products.h"
 
 namespace eigenpose {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Luma out of camera formats, 16 pixels at a time. For grey pictures no colour is ever computed.
+/// Luma of camera formats. For grey pictures no colour is computed.
 
 #include <cstddef>
 #include <cstdint>

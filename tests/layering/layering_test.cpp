@@ -30,7 +30,7 @@ const std::vector<std::string> core_rooms = {
 /// Room outside core → rooms it may include. Every room may include its own.
 const std::map<std::string, std::set<std::string>> outer_licences = {
     {"drivers", {"core/base", "core/image"}},
-    {"drivers/v4l2", {"drivers", "core/base", "core/image"}},
+    {"drivers/v4l2", {"drivers", "core/base", "core/simd", "core/image"}},
     {"drivers/modbus", {"drivers", "core/base"}},
     {"drivers/usb", {"drivers", "core/base"}},
     {"sim", {"drivers", "drivers/usb", "core/base", "core/image"}},

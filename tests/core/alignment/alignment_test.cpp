@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "core/simd/dense_kernels.h"
 #include "tests/support/drawn_pictures.h"
 
 namespace eigenpose {
@@ -295,22 +294,6 @@ TEST(AlignmentEigenspace, SamplesATurnByDegreesAndAnOpenAxisToItsEnds) {
   EXPECT_DOUBLE_EQ(poses.row(1).maxCoeff(), 8.0);
   EXPECT_LT(poses.row(0).maxCoeff(), 360.0);
   EXPECT_LE(both.sample_grid().size(), 4096U);
-}
-
-TEST(DenseKernels, AgreeWithPlainSums) {
-  const Eigen::MatrixXf matrix = Eigen::MatrixXf::Random(77, 5);
-  const Eigen::MatrixXf vectors = Eigen::MatrixXf::Random(77, 6);
-  Eigen::MatrixXf out = Eigen::MatrixXf::Constant(7, 6, 3.0F);
-  multiply_transposed_six(matrix.data(), 77, 5, vectors.data(), out.data(), 7);
-  EXPECT_LT((out.topRows(5) - matrix.transpose() * vectors).norm(), 1e-4F);
-  EXPECT_EQ(out.bottomRows(2).minCoeff(), 3.0F) << "what lies between the columns is left alone";
-  EXPECT_EQ(out.bottomRows(2).maxCoeff(), 3.0F);
-  float squared = 0.0F;
-  float products[5];
-  residual_products(matrix.data(), vectors.data(), 77, squared, products);
-  const Eigen::VectorXf r = matrix.col(0) - vectors.col(0);
-  EXPECT_NEAR(squared, r.squaredNorm(), 1e-3F);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(products[i], r.dot(vectors.col(i + 1)), 1e-3F);
 }
 
 }  // namespace

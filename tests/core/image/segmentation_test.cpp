@@ -1,11 +1,8 @@
 #include "core/image/segmentation.h"
 
-#include <random>
-
 #include <gmock/gmock.h>
 #include <opencv2/imgproc.hpp>
 
-#include "core/simd/threshold_kernels.h"
 #include "tests/support/synthetic_objects.h"
 
 namespace eigenpose {
@@ -17,21 +14,6 @@ cv::Mat plain(int background, double noise, int type = CV_8UC1, int seed = 3) {
   cv::Mat image(240, 320, type);
   cv::RNG(static_cast<std::uint64_t>(seed)).fill(image, cv::RNG::NORMAL, background, noise);
   return image;
-}
-
-TEST(ThresholdKernel, AgreesWithThePlainOneForAnyWidthAndThreshold) {
-  std::mt19937 random(5);
-  for (const int bands : {1, 3})
-    for (const int width : {1, 7, 63, 64, 65, 130, 640})
-      for (const int threshold : {0, 1, 127, 128, 200, 254}) {
-        std::vector<std::uint8_t> row(static_cast<std::size_t>(width * bands));
-        for (auto& value : row) value = static_cast<std::uint8_t>(random());
-        std::vector<std::uint64_t> fast((static_cast<std::size_t>(width) + 63) / 64, 99);
-        std::vector<std::uint64_t> slow(fast.size(), 77);
-        threshold_row(row.data(), width, bands, static_cast<std::uint8_t>(threshold), fast.data());
-        threshold_row_plain(row.data(), width, bands, static_cast<std::uint8_t>(threshold), slow.data());
-        ASSERT_EQ(fast, slow) << bands << " bands, width " << width << ", threshold " << threshold;
-      }
 }
 
 TEST(Segmenter, FindsNothingOnAnEmptyTableWhateverItsLevelAndNoise) {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/search/tree_search.h"
-#include "core/simd/box_kernels.h"
+#include "core/simd/targets.h"
 #include "tests/core/search/search_queries.h"
 #include "tests/support/exhaustive_search.h"
 #include "tests/support/synthetic_manifolds.h"
@@ -197,15 +197,15 @@ TEST(TreeSearch, AnswersAlikeWithEveryInstructionSet) {
   std::mt19937 random(17);
   std::vector<Manifold> manifolds;
   for (int i = 0; i < 60; ++i) manifolds.push_back(synthetic::smooth_curve(36, 21, 2, random));
-  const auto kernels = box_kernels();
-  for (const auto& [name, kernel] : kernels) {
-    const TreeSearch plain(manifolds, kernels[0].kernel);
-    const TreeSearch other(manifolds, kernel);
-    for (int i = 0; i < 2000; ++i) {
-      const auto query = synthetic::random_query(manifolds, random);
-      ClosestPoint a[2];
+  const TreeSearch search(manifolds);
+  for (int i = 0; i < 2000; ++i) {
+    const auto query = synthetic::random_query(manifolds, random);
+    ClosestPoint a[2];
+    const std::size_t count = search.nearest_into(query.point, a);
+    for (const std::string& name : simd_targets()) {
+      const OnlySimdTarget only(name);
       ClosestPoint b[2];
-      ASSERT_EQ(plain.nearest_into(query.point, a), other.nearest_into(query.point, b)) << name;
+      ASSERT_EQ(search.nearest_into(query.point, b), count) << name;
       for (int k = 0; k < 2; ++k) {
         ASSERT_EQ(a[k].manifold, b[k].manifold) << name;
         ASSERT_EQ(a[k].q, b[k].q) << name;

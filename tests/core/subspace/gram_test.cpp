@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "core/simd/targets.h"
 #include "core/subspace/memory_source.h"
 #include "core/subspace/solver.h"
 #include "tests/core/subspace/subspace_samples.h"
@@ -49,13 +50,16 @@ TEST(Gram, IsTheSameBitForBitWithAnyThreadsTilesAndInstructions) {
   const FloatSource float_source(test::views_of_rank(1111, 210, 20, 3));
   for (const AppearanceSource* source : {static_cast<const AppearanceSource*>(&byte_source),
                                          static_cast<const AppearanceSource*>(&float_source)}) {
-    const Eigen::MatrixXd one = gram_matrix(*source, {1, 0, nullptr});
-    EXPECT_EQ(one, gram_matrix(*source, {3, 0, nullptr})) << "threads";
-    EXPECT_EQ(one, gram_matrix(*source, {2, 0, &portable_kernels()})) << "instructions";
+    const Eigen::MatrixXd one = gram_matrix(*source, {1, 0});
+    EXPECT_EQ(one, gram_matrix(*source, {3, 0})) << "threads";
+    for (const std::string& target : simd_targets()) {
+      const OnlySimdTarget only(target);
+      EXPECT_EQ(one, gram_matrix(*source, {2, 0})) << target;
+    }
     const StreamedSource streamed(*source);
-    EXPECT_EQ(one, gram_matrix(streamed, {2, 0, nullptr})) << "read whole";
-    EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 60, nullptr})) << "read in tiles";
-    EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 2, nullptr})) << "read two views at a time";
+    EXPECT_EQ(one, gram_matrix(streamed, {2, 0})) << "read whole";
+    EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 60})) << "read in tiles";
+    EXPECT_EQ(one, gram_matrix(streamed, {2, 1111 * 4 * 2})) << "read two views at a time";
   }
 }
 
@@ -113,15 +117,14 @@ TEST(KnownProducts, HoldForFloatsAndInTiles) {
   const FloatSource source(views);
   const Eigen::MatrixXd whole = gram_matrix(source, {});
   const KnownProducts known = known_of(whole, 220, {{0, 250}});
-  EXPECT_EQ(gram_matrix(source, {2, 0, nullptr, &known}), whole);
-  EXPECT_EQ(gram_matrix(StreamedSource(source), {2, 200 * 4 * 120, nullptr, &known}), whole);
+  EXPECT_EQ(gram_matrix(source, {2, 0, &known}), whole);
+  EXPECT_EQ(gram_matrix(StreamedSource(source), {2, 200 * 4 * 120, &known}), whole);
 }
 
 TEST(KnownProducts, AreTakenNotComputedAgain) {
   const auto bytes = test::smooth_views(200, 64, 1);
   const KnownProducts known{Eigen::MatrixXd::Constant(1, 1, 7.0), std::vector<Eigen::Index>(200, 0)};
-  EXPECT_EQ(gram_matrix(ByteSource(bytes, 64), {1, 0, nullptr, &known}),
-            Eigen::MatrixXd::Constant(200, 200, 7.0));
+  EXPECT_EQ(gram_matrix(ByteSource(bytes, 64), {1, 0, &known}), Eigen::MatrixXd::Constant(200, 200, 7.0));
 }
 
 TEST(KnownProducts, OfOtherViewsAreRefused) {
@@ -132,15 +135,15 @@ TEST(KnownProducts, OfOtherViewsAreRefused) {
                                      {products, std::vector<Eigen::Index>(20, 5)},
                                      {products, std::vector<Eigen::Index>(20, -2)},
                                      {products.leftCols(4), std::vector<Eigen::Index>(20, 0)}})
-    EXPECT_THROW(gram_matrix(source, {1, 0, nullptr, &known}), std::invalid_argument);
+    EXPECT_THROW(gram_matrix(source, {1, 0, &known}), std::invalid_argument);
 }
 
 TEST(Gram, RefusesAMemoryLimitThatHoldsNoTwoViews) {
   const auto bytes = test::smooth_views(5, 100, 1);
   const ByteSource source(bytes, 100);
   const StreamedSource streamed(source);
-  EXPECT_THROW(gram_matrix(streamed, {1, 150, nullptr}), std::invalid_argument);
-  EXPECT_THROW(gram_matrix(streamed, {1, 50, nullptr}), std::invalid_argument);
+  EXPECT_THROW(gram_matrix(streamed, {1, 150}), std::invalid_argument);
+  EXPECT_THROW(gram_matrix(streamed, {1, 50}), std::invalid_argument);
 }
 
 TEST(Gram, NamesTheBlackView) {
@@ -179,7 +182,7 @@ TEST(Gram, StopsOnRequest) {
   const auto at_second = [&](const ProgressUpdate& update) {
     if (update.done == 2) stop.request_stop();
   };
-  EXPECT_THROW(gram_matrix(source, {1, 0, nullptr}, at_second, stop.get_token()), Interrupted);
+  EXPECT_THROW(gram_matrix(source, {1, 0}, at_second, stop.get_token()), Interrupted);
 }
 
 }  // namespace

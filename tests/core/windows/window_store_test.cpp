@@ -4,33 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/simd/window_kernels.h"
-
 namespace eigenpose {
 namespace {
-
-TEST(WindowKernels, GiveThePortableAnswerInEveryBit) {
-  std::mt19937 random(3);
-  std::uniform_int_distribution<int> value(-127, 127);
-  std::uniform_int_distribution<int> query(0, 127);
-  constexpr std::size_t groups = 5;
-  std::vector<std::int8_t> values(groups * 256);
-  std::vector<std::int32_t> biases(groups * 8);
-  std::vector<std::uint8_t> q(96);
-  const std::vector<PlacedQuery> queries = {{q.data(), 37, 2}, {q.data() + 32, 0, 0}, {q.data() + 64, 5, 3}};
-  for (int round = 0; round < 200; ++round) {
-    // Every tenth round takes the largest values there are: nothing may overflow.
-    for (auto& v : values)
-      v = static_cast<std::int8_t>(round % 10 == 0 ? (round % 20 == 0 ? 127 : -127) : value(random));
-    for (auto& v : q) v = static_cast<std::uint8_t>(round % 10 == 0 ? 127 : query(random));
-    for (auto& b : biases) b = value(random) * 100;
-    std::vector<std::int32_t> chosen(4 * groups * 8, -5000);
-    std::vector<std::int32_t> portable = chosen;
-    raise_scores(values.data(), biases.data(), groups, queries, chosen.data());
-    raise_scores_portable(values.data(), biases.data(), groups, queries, portable.data());
-    ASSERT_EQ(chosen, portable);
-  }
-}
 
 TEST(WindowStore, FindsTheSquaredDistanceToTheNearestWindowWithinTheTolerance) {
   std::mt19937 random(4);

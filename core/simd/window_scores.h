@@ -1,6 +1,7 @@
 #pragma once
 
-/// The inner loop of partial matching, in integers: the same answer on every machine.
+/// Scores of learned windows against those of a picture: most of the time of partial matching. Exact, and the
+/// same on every target. Thread-safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,20 +11,16 @@ namespace eigenpose {
 
 /// A query window that is compared with the learned windows of one place.
 struct PlacedQuery {
-  const std::uint8_t* values;  ///< 32 numbers 0…127, so that no partial sum of 16 bits overflows
+  const std::uint8_t* values;  ///< 32 components 0…127
   std::int32_t penalty;        ///< for the offset between the two places
   std::uint32_t index;         ///< of its row of scores
 };
 
 /// For each query and each of groups × 8 views of one place: score ← max(score, Σ_k query[k]·value[k] − bias
-/// − penalty), over 32 dimensions.
-/// @param values groups × 256 bytes: [8][8 views][4 dimensions]; @param biases groups × 8;
+/// − penalty), over 32 components. No pointer needs alignment. Queries may share an index.
+/// @param values groups × 256 bytes: [8][8 views][4 components]; @param biases groups × 8;
 /// @param scores rows of groups × 8, one for each query's index.
 void raise_scores(const std::int8_t* values, const std::int32_t* biases, std::size_t groups,
                   std::span<const PlacedQuery> queries, std::int32_t* scores);
-
-/// The same without special instructions: the oracle of the tests.
-void raise_scores_portable(const std::int8_t* values, const std::int32_t* biases, std::size_t groups,
-                           std::span<const PlacedQuery> queries, std::int32_t* scores);
 
 }  // namespace eigenpose
