@@ -2,6 +2,7 @@
 #
 #   prepare_packages [tests] [ci]   install what is missing with apt (as root, or through sudo)
 #   prepare_guest_packages          the same for the virtual machine, without which everything else still works
+#   prepare_cross_packages          the same for the vector kernels on AArch64
 #   prepare_owner "$@"      when root runs a checkout that belongs to somebody else, go on as that somebody
 #   prepare_guest           begin to fetch and unpack the virtual machine's kernel, beside what comes next
 #   finish_guest            wait for it; where it cannot be had, say why, now and in each test that needs it
@@ -21,6 +22,8 @@ build_packages=(
 test_packages=(mbpoll python3-pymodbus python3-serial python3-serial-asyncio socat)
 # The virtual machine with real kernel devices.
 guest_packages=(qemu-system-x86 seabios ipxe-qemu busybox-static cpio kmod udev xz-utils binutils)
+# The vector kernels on another processor: cross compiler and emulator.
+cross_packages=(g++-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static)
 # What .ci/run checks with.
 ci_packages=(clang-format clang-tidy)
 
@@ -65,6 +68,13 @@ prepare_packages() {
   command -v dpkg-query >/dev/null || fail "This script installs Debian packages and found no dpkg here. Install by hand: ${wanted[*]}"
   find_missing "${wanted[@]}"
   [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}" || fail "$trouble"
+}
+
+prepare_cross_packages() {
+  local missing trouble
+  find_missing "${cross_packages[@]}"
+  [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}" ||
+    printf '%s\n' "$trouble" "The vector kernels will not be tested on AArch64."
 }
 
 prepare_guest_packages() {
