@@ -24,12 +24,22 @@ json or_null(const std::string& text) {
 
 }  // namespace
 
+/// {"cut short": 3}: what was wrong with frames, without what never occurred.
+json damage_json(const CameraStatistics& statistics) {
+  json result = json::object();
+  for (std::size_t fault = 0; fault < frame_fault_count; ++fault)
+    if (statistics.damaged_by[fault] > 0)
+      result[std::string(name_of(static_cast<FrameFault>(fault)))] = statistics.damaged_by[fault];
+  return result;
+}
+
 json to_json(const CameraStatus& camera) {
   if (!camera.configured) return nullptr;
   json result = {{"error", or_null(camera.error)},
                  {"frames_taken", camera.statistics.frames_taken},
                  {"frames_dropped", camera.statistics.frames_dropped},
                  {"frames_damaged", camera.statistics.frames_damaged},
+                 {"damaged_by", damage_json(camera.statistics)},
                  {"times_lost", camera.statistics.times_lost},
                  {"frame_sequence", or_null(camera.frame_sequence)},
                  {"frame_age_s", nullptr}};
@@ -152,6 +162,7 @@ json status_json(const ApiSources& sources) {
           {"watch",
            {{"frames", watched.frames},
             {"recognitions", watched.recognitions},
+            {"flicker", watched.flicker},
             {"error", or_null(watched.error)}}},
           {"run", sources.results->run()},
           {"last_result", sources.results->last_sequence()},

@@ -225,6 +225,16 @@ std::string words_of(const DeviceError& error) {
   return words.starts_with(name) ? words.substr(name.size()) : words;
 }
 
+/// ": 3 cut short, 1 too short"; empty where the camera gives no reasons.
+std::string damage_words(const CameraStatistics& counts) {
+  std::string words;
+  for (std::size_t fault = 0; fault < frame_fault_count; ++fault)
+    if (counts.damaged_by[fault] > 0)
+      words += fmt::format("{} {} {}", words.empty() ? ":" : ",", counts.damaged_by[fault],
+                           name_of(static_cast<FrameFault>(fault)));
+  return words;
+}
+
 void check_camera(const Devices& devices, const Clock& clock, const std::stop_token& stop,
                   const Report& report) {
   const std::unique_ptr<Camera> camera = devices.camera();
@@ -249,10 +259,10 @@ void check_camera(const Devices& devices, const Clock& clock, const std::stop_to
   }
   const CameraStatistics counts = camera->statistics();
   if (counts.frames_damaged > 0) {
-    report(
-        {Health::note, "camera",
-         fmt::format("{} of {} frames came damaged", counts.frames_damaged, frames + counts.frames_damaged),
-         "try another cable or USB port"});
+    report({Health::note, "camera",
+            fmt::format("{} of {} frames came damaged{}", counts.frames_damaged,
+                        frames + counts.frames_damaged, damage_words(counts)),
+            "try another cable or USB port"});
   }
   check_picture(frame, report);
 }

@@ -17,7 +17,11 @@ constexpr std::chrono::seconds watcher_look_limit{90};
 
 Watcher::Watcher(const WatcherOptions& options, const FrameHub& camera, const ModelStore& models,
                  EventSink& events, Heartbeat& heartbeat)
-    : camera_(camera), models_(models), events_(events), scene_(options.scene) {
+    : camera_(camera),
+      models_(models),
+      events_(events),
+      region_time_(options.region_time),
+      scene_(options.scene) {
   if (!options.enabled) return;
   pulse_ = heartbeat.join("watcher", watcher_look_limit);
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
@@ -54,7 +58,7 @@ void Watcher::run(const std::stop_token& stop) {
       settled_reported_ = false;
     }
     try {
-      look(*frame);
+      look(*frame, stop);
     } catch (const std::exception& error) {
       note_failure(error);
     }
@@ -67,16 +71,17 @@ void Watcher::note_failure(const std::exception& error) {
   status_.error = error.what();
 }
 
-void Watcher::look(const Frame& frame) {
+void Watcher::look(const Frame& frame, const std::stop_token& stop) {
   const SceneChange::Observation seen = scene_.update(frame);
   {
     const std::lock_guard lock(mutex_);
     ++status_.frames;
+    status_.flicker = scene_.flicker();
   }
   if (auto model = models_.current(); model != model_) use_model(std::move(model));
   if (!recognizer_) return;
   if (seen.settled && (seen.changed || !settled_reported_ || fresh_model_))
-    report_settled(frame);
+    report_settled(frame, stop);
   else if (!seen.settled && seen.changed && settled_reported_)
     report_change(frame);
 }
@@ -97,7 +102,7 @@ void Watcher::report_change(const Frame& frame) {
   events_.publish(result);
 }
 
-void Watcher::report_settled(const Frame& frame) {
+void Watcher::report_settled(const Frame& frame, const std::stop_token& stop) {
   // Whatever happens below, this scene has been looked at: a failure is reported once, not with every frame.
   scene_.accept();
   settled_reported_ = true;
@@ -106,7 +111,9 @@ void Watcher::report_settled(const Frame& frame) {
   result.frame = {frame.sequence, frame.exposure_start};
   result.model = model_;
   RecognitionTimes times;
-  const std::span<const Outcome> outcomes = recognizer_->recognize(frame.image, &times);
+  const std::span<const Outcome> outcomes =
+      recognizer_->recognize(frame.image, {.stop = stop, .region_time = region_time_}, &times);
+  if (stop.stop_requested()) return;  // what was found so far is not the whole scene
   result.outcomes.assign(outcomes.begin(), outcomes.end());
   result.times = times;
   result.time = std::chrono::system_clock::now();

@@ -21,6 +21,8 @@ namespace eigenpose {
 
 struct WatcherOptions {
   bool enabled = true;
+  /// For the search in one region: an outcome that took longer says that it is unfinished.
+  Duration region_time = std::chrono::seconds(2);
   SceneChangeOptions scene;  ///< when a picture counts as settled
 };
 
@@ -28,6 +30,7 @@ struct WatcherOptions {
 struct WatchStatus {
   std::uint64_t frames = 0;          ///< looked at for change
   std::uint64_t recognitions = 0;    ///< settled scenes recognised
+  double flicker = 0.0;              ///< amplitude of the light's flicker, 0.05 is ±5 % (see SceneChange)
   std::optional<std::string> error;  ///< why the last one could not be
 };
 
@@ -60,15 +63,16 @@ class Watcher {
 
  private:
   void run(const std::stop_token& stop);
-  void look(const Frame& frame);
+  void look(const Frame& frame, const std::stop_token& stop);
   void report_change(const Frame& frame);
-  void report_settled(const Frame& frame);
+  void report_settled(const Frame& frame, const std::stop_token& stop);
   void use_model(std::shared_ptr<const Model> model);
   void note_failure(const std::exception& error);
 
   const FrameHub& camera_;
   const ModelStore& models_;
   EventSink& events_;
+  const Duration region_time_;
   Heartbeat::Pulse pulse_;  ///< beaten on the watcher's thread
   std::mutex looking_;      ///< held while a frame is looked at
   int pauses_ = 0;          ///< guarded by looking_

@@ -73,6 +73,7 @@ json outcome_json(const Outcome& outcome, const Model& model) {
                  {"rejection_distance", outcome.rejection_distance},
                  {"covered_share", outcome.covered_share},
                  {"confidence", outcome.confidence},
+                 {"unfinished", outcome.unfinished},
                  {"runner_up", alternative(outcome.runner_up, model)},
                  {"other_pose", alternative(outcome.other_pose, model)}};
   if (outcome.best) {
