@@ -14,7 +14,7 @@ build="$top/build/release"
 build_packages=(
   cmake ninja-build g++ pkg-config
   libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libeigen3-dev libflann-dev libhwy-dev
-  libmodbus-dev libusb-1.0-0-dev libhdf5-dev libsqlite3-dev libjpeg62-turbo-dev libpng-dev libboost-dev nlohmann-json3-dev
+  libmodbus-dev libusb-1.0-0-dev libhdf5-dev libjpeg62-turbo-dev libpng-dev libboost-dev nlohmann-json3-dev
   libtomlplusplus-dev libcli11-dev libspdlog-dev libfmt-dev libsystemd-dev libembree-dev libtbb-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )

@@ -22,7 +22,7 @@ std::string answer_to(const std::string& text) {
   return "accepted";
 }
 
-const std::string modbus_axis = "[[axis]]\nname = \"t\"\ndriver = \"modbus\"\nendpoint = \"tcp://h:502\"\n";
+const std::string table_header = "[[axis]]\nname = \"t\"\ndriver = \"modbus\"\nendpoint = \"tcp://h:502\"\n";
 const std::string v4l2 = "[camera]\ndriver = \"v4l2\"\n";
 const std::string simulated = "[sim]\n[camera]\ndriver = \"simulated\"\n";
 const std::string replay = "[sim]\n[camera]\ndriver = \"replay\"\nfolder = \"f\"\n";
@@ -41,9 +41,9 @@ const std::vector<Bounds> whole_numbers = {
     {v4l2, "input", "-1", "0", "63", "64"},
     {v4l2, "width", "63", "64", "8192", "8193"},
     {v4l2, "height", "63", "64", "8192", "8193"},
-    {modbus_axis, "station", "0", "1", "247", "248"},
-    {modbus_axis, "settle_ms", "-1", "0", "60000", "60001"},
-    {modbus_axis, "move_timeout_ms", "99", "100", "3600000", "3600001"},
+    {table_header, "station", "0", "1", "247", "248"},
+    {table_header, "settle_ms", "-1", "0", "60000", "60001"},
+    {table_header, "move_timeout_ms", "99", "100", "3600000", "3600001"},
     {"[[lamp]]\nname = \"l\"\ndriver = \"dmx\"\nendpoint = \"usb:1\"\n", "channel", "0", "1", "512", "513"},
     {"[[lamp]]\nname = \"l\"\ndriver = \"modbus\"\nendpoint = \"tcp://h:502\"\nprofile = \"p\"\n", "station",
      "0", "1", "247", "248"},
@@ -57,10 +57,10 @@ const std::vector<Bounds> floating_point_numbers = {
     {v4l2, "frames_per_second", "0.099", "0.1", "1000.0", "1000.001"},
     {simulated, "exposure_ms", "-0.001", "0.0", "1000.0", "1000.001"},
     {replay, "degrees_per_index", "0.0009", "0.001", "180.0", "180.001"},
-    {modbus_axis, "home_offset", "-1.000001e9", "-1e9", "1e9", "1.000001e9"},
-    {modbus_axis, "steps_per_unit", "0.0009", "0.001", "1e7", "10000001.0"},
-    {modbus_axis, "speed", "0.9e-6", "1e-6", "1e6", "1000001.0"},
-    {modbus_axis, "arrival_tolerance", "0.9e-6", "1e-6", "10.0", "10.001"},
+    {table_header, "home_offset", "-1.000001e9", "-1e9", "1e9", "1.000001e9"},
+    {table_header, "steps_per_unit", "0.0009", "0.001", "1e7", "10000001.0"},
+    {table_header, "speed", "0.9e-6", "1e-6", "1e6", "1000001.0"},
+    {table_header, "arrival_tolerance", "0.9e-6", "1e-6", "10.0", "10.001"},
     {"[[lamp]]\nname = \"l\"\ndriver = \"dmx\"\nendpoint = \"usb:1\"\n", "level", "-0.001", "0.0", "1.0",
      "1.001"},
     {"[learn]\n", "energy", "0.009", "0.01", "1.0", "1.001"},

@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,66 +57,6 @@ TEST(Config, AValueOutOfRangeIsRefusedWithTheRange) {
   EXPECT_THAT(refusal("[learn]\nenergy = nan\n"), HasSubstr("0.01 to 1"));
   EXPECT_THAT(refusal("[api]\nmax_connections = 0\n"), HasSubstr("1 to 1000"));
   EXPECT_THAT(refusal(axis + "station = 248\n"), HasSubstr("1 to 247"));
-}
-
-/// A table's header and the keys it needs; a key, its bounds, and the step beyond them.
-struct Bounds {
-  std::string before;
-  std::string key;
-  double lower;
-  double upper;
-  double step;
-};
-
-TEST(Config, EveryNumberIsTakenUpToBothItsBoundsAndNotBeyond) {
-  const std::string simulated = "[sim]\n[camera]\ndriver = \"simulated\"\n";
-  const std::string replay = "[sim]\n[camera]\ndriver = \"replay\"\nfolder = \"f\"\n";
-  const std::string v4l2 = "[camera]\ndriver = \"v4l2\"\n";
-  const std::string lamp = "[[lamp]]\nname = \"key\"\ndriver = \"dmx\"\nendpoint = \"usb:A\"\n";
-  const std::vector<Bounds> all = {
-      {"[api]\n", "max_connections", 1, 1000, 1},
-      {"[api]\n", "max_body_kib", 1, 16384, 1},
-      {"[api]\n", "request_timeout_ms", 100, 600'000, 1},
-      {"[api]\n", "event_buffer", 1, 100'000, 1},
-      {v4l2, "input", 0, 63, 1},
-      {v4l2, "width", 64, 8192, 1},
-      {v4l2, "height", 64, 8192, 1},
-      {v4l2, "frames_per_second", 0.1, 1000, 0.01},
-      {simulated, "exposure_ms", 0, 1000, 0.01},
-      {replay, "degrees_per_index", 0.001, 180, 0.0005},
-      {axis, "station", 1, 247, 1},
-      {axis, "steps_per_unit", 1e-3, 1e7, 5e-4},
-      {axis, "speed", 1e-6, 1e6, 5e-7},
-      {axis, "arrival_tolerance", 1e-6, 10, 5e-7},
-      {axis, "settle_ms", 0, 60'000, 1},
-      {axis, "move_timeout_ms", 100, 3'600'000, 1},
-      {axis, "home_offset", -1e9, 1e9, 1},
-      {lamp, "channel", 1, 512, 1},
-      {lamp, "level", 0, 1, 0.001},
-      {"[learn]\n", "components", 1, 1024, 1},
-      {"[learn]\n", "energy", 0.01, 1, 0.001},
-      {"[learn]\n", "size", 8, 256, 1},
-      {"[watch]\n", "settle_ms", 0, 60'000, 1},
-      {"[watch]\n", "threshold", 0.5, 255, 0.01},
-      {"[sim]\n", "seed", 0, 9e15, 1},
-      {"[sim]\n", "speed_factor", 0.01, 1000, 0.001},
-  };
-  for (const Bounds& bounds : all) {
-    const bool whole = bounds.step == 1 && bounds.key != "home_offset";
-    const auto with = [&](double value) {
-      const std::string number =
-          whole ? std::to_string(static_cast<long long>(value)) : fmt::format("{:.7f}", value);
-      return bounds.before + bounds.key + " = " + number + "\n";
-    };
-    EXPECT_EQ(refusal(with(bounds.lower)), "accepted") << bounds.key;
-    EXPECT_EQ(refusal(with(bounds.upper)), "accepted") << bounds.key;
-    EXPECT_THAT(refusal(with(bounds.lower - bounds.step)), HasSubstr(bounds.key)) << "below";
-    if (bounds.key == "seed") continue;  // up to what a whole number holds
-    EXPECT_THAT(refusal(with(bounds.upper + bounds.step)), HasSubstr(bounds.key)) << "above";
-    for (const char* no_number : {"nan", "inf", "\"1\"", "true"})
-      EXPECT_THAT(refusal(bounds.before + bounds.key + " = " + no_number + "\n"), HasSubstr(bounds.key))
-          << no_number;
-  }
 }
 
 TEST(Config, EndsOfARangeAreNumbersWithinReason) {

@@ -209,7 +209,8 @@ TEST_F(DaemonProcess, ReplacesTheSocketsOfOneThatWasKilled) {
 TEST_F(DaemonProcess, NothingFromOutsideMakesALogLineOfItsOwn) {
   const std::filesystem::path file = folder_.path() / "a\nlevel=error event=forged \x1b[2J.toml";
   std::filesystem::copy_file(std::string(EIGENPOSE_SOURCE_DIR) + "/config/rigs/simulated.toml", file);
-  Program daemon({"--config", file.string(), "--runtime-dir", run_.string(), "--state-dir", state_.string()},
+  Program daemon(EIGENPOSED,
+                 {"--config", file.string(), "--runtime-dir", run_.string(), "--state-dir", state_.string()},
                  log_);
   status_once_ready();
   daemon.signal(SIGTERM);
