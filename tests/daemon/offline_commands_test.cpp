@@ -218,9 +218,6 @@ TEST_F(OfflineCommands, SayWhichLineOfATableIsWrong) {
   EXPECT_EQ(wrong.code, 1);
   EXPECT_THAT(wrong.output,
               AllOf(HasSubstr("poses.csv"), HasSubstr("line 3"), HasSubstr("table_deg is \"a\"")));
-  const Ended option = eigenpose("import table poses.csv --to other --ignore colour");
-  EXPECT_EQ(option.code, 1);
-  EXPECT_THAT(option.output, HasSubstr("line 3"));
   std::ofstream(path("poses.csv"), std::ios::binary)
       << "file,object,table_deg\nmug.png,mug,0\nmug.png,duck,9\n";
   const Ended unknown = eigenpose("import table poses.csv --to other --ignore colour");

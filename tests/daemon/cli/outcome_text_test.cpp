@@ -111,6 +111,7 @@ TEST(OutcomeJson, HoldsEveryPartOfTheOutcome) {
   outcome.q_covariance = {0.25};
   outcome.box = {1, 2, 3, 4};
   outcome.covered_share = 0.1;
+  outcome.unfinished = true;
   outcome.runner_up = Hypothesis{"bottle", {10.0}, 0.5};
   const json expected = {{"verdict", "recognized"},
                          {"box", {1, 2, 3, 4}},
@@ -124,6 +125,7 @@ TEST(OutcomeJson, HoldsEveryPartOfTheOutcome) {
                          {"rejection_distance", 0.081},
                          {"covered_share", 0.1},
                          {"confidence", 0.37},
+                         {"unfinished", true},
                          {"runner_up",
                           {{"object", "bottle"},
                            {"q", json::array({nullptr})},

@@ -7,6 +7,7 @@
 #include <memory>
 #include <numbers>
 
+#include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/dataset/image_set.h"
@@ -31,8 +32,8 @@ cv::Mat view(int width, double angle_deg) {
 }
 
 void write_turn(const char* folder, const char* name, int width) {
-  const Workspace workspace({{.name = "table", .unit = "deg", .min = 0, .max = 360, .periodic = true}});
-  ImageSetWriter set(folder, name, workspace, {});
+  const Workspace workspace = turntable_workspace();
+  ImageSetWriter set(folder, name, workspace, nlohmann::json::object());
   for (int angle = 0; angle < 360; angle += 10) set.add(view(width, angle), {static_cast<double>(angle)});
   set.finish();
 }
