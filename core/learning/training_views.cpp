@@ -322,6 +322,7 @@ void TrainingViews::settle(Intake& intake, BadViews bad_views) {
   const ImageSet& images = *intake.set->images;
   const Kind usual = usual_kind(intake.views);
   std::vector<std::size_t> usable;
+  std::optional<std::size_t> first_bad;
   std::vector<std::vector<double>> poses;
   for (std::size_t i = 0; i < intake.views.size(); ++i) {
     TakenView& view = intake.views[i];
@@ -329,6 +330,7 @@ void TrainingViews::settle(Intake& intake, BadViews bad_views) {
       view.reason = "is " + view.kind.text() + ", most views of \"" + images.object() + "\" are " +
                     usual.text() + "; all views of an object must be alike: acquire it again";
     if (!view.reason.empty()) {
+      if (!first_bad) first_bad = i;
       leave_out({images.object(), intake.file(i), false, view.reason}, bad_views);
       continue;
     }
@@ -337,10 +339,13 @@ void TrainingViews::settle(Intake& intake, BadViews bad_views) {
   }
   const std::size_t needed = least_views(images.workspace());
   if (!intake.refused && usable.size() < needed)
-    intake.refused = "has " + std::to_string(usable.size()) + " view(s) of \"" + images.object() +
-                     "\" that can be used, of " + std::to_string(intake.chosen.size()) + "; at least " +
-                     std::to_string(needed) + " are needed" +
-                     (needed == 3 ? " to close a turn" : " to span a range") + ": acquire more";
+    intake.refused =
+        "has " + std::to_string(usable.size()) + " view(s) of \"" + images.object() +
+        "\" that can be used, of " + std::to_string(intake.chosen.size()) + "; at least " +
+        std::to_string(needed) + " are needed" + (needed == 3 ? " to close a turn" : " to span a range") +
+        (first_bad
+             ? "; " + intake.file(*first_bad).filename().string() + " " + intake.views[*first_bad].reason
+             : ": acquire more");
   LearnedGrid grid;
   if (!intake.refused) try {
       grid = find_learned_grid(images.workspace(), poses, images.object());

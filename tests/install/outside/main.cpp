@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
     write_turn(argv[1], "stout", 34);
     LearningOptions options;
     options.normalization.size = 32;
+    options.normalization.color = false;
     options.solver.components = 8;
     const std::string file = std::string(argv[1]) + "/outside.model";
     save_model(learn(all_views(open_image_sets(argv[1])), options), file);
