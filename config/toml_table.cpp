@@ -96,10 +96,14 @@ struct TomlTable::Impl {
 TomlTable::TomlTable(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 TomlTable TomlTable::read_file(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file))
-    throw ConfigError(file.string() + ": cannot be read: give the configuration with --config FILE");
-  // One byte more than is allowed: a device may have no end.
+  // Looked at before it is opened: opening a pipe waits for its other end.
+  std::error_code unknown;
+  std::ifstream stream;
+  if (std::filesystem::is_regular_file(file, unknown)) stream.open(file, std::ios::binary);
+  if (!stream.is_open())
+    throw ConfigError(file.string() +
+                      ": is not a file that can be read: give the configuration with --config FILE");
+  // One byte more than is allowed.
   std::string text(most_bytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));

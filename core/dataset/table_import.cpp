@@ -125,11 +125,15 @@ void PoseTable::find_columns() {
 
 void PoseTable::check_options() const {
   const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
-    for (const std::string& name : names)
-      if (std::none_of(columns_.begin(), columns_.end(),
-                       [&](const DofColumn& column) { return name == column.header || name == column.name; }))
-        throw std::invalid_argument("\"" + name + "\" is to be " + what + ", but no column of " +
-                                    file_.string() + " is named so");
+    const auto is_there = [&](const std::string& name) {
+      return std::any_of(columns_.begin(), columns_.end(), [&](const DofColumn& column) {
+        return name == column.header || name == column.name;
+      });
+    };
+    const auto missing = std::find_if_not(names.begin(), names.end(), is_there);
+    if (missing != names.end())
+      throw std::invalid_argument("\"" + *missing + "\" is to be " + what + ", but no column of " +
+                                  file_.string() + " is named so");
   };
   check(options_.periodic, "periodic");
   check(options_.open, "open");
@@ -194,7 +198,7 @@ Dof PoseTable::dof(const DofColumn& column) const {
 fs::path PoseTable::picture(const CsvRow& row) const {
   const std::string& name = row.fields[file_column_];
   if (name.empty()) fail(row, "file is empty; every row names a picture");
-  const fs::path path = fs::path(name).is_absolute() ? fs::path(name) : file_.parent_path() / name;
+  fs::path path = fs::path(name).is_absolute() ? fs::path(name) : file_.parent_path() / name;
   std::error_code error;
   if (!fs::is_regular_file(path, error))
     fail(row, "there is no picture \"" + path.string() + "\"; a file is relative to the table's folder");

@@ -2,6 +2,8 @@
 
 #include "config/toml_table.h"
 
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -10,8 +12,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "core/base/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
@@ -39,6 +43,16 @@ std::string complaint(std::string_view text, Read read) {
 
 std::string complaint(std::string_view text) {
   return complaint(text, [](const TomlTable&) {});
+}
+
+/// The message of the refusal of a file.
+std::string refusal_of(const std::filesystem::path& file) {
+  try {
+    (void)TomlTable::read_file(file);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "accepted";
 }
 
 const auto as_text = [](const TomlTable& table) { (void)table.text("k"); };
@@ -268,12 +282,18 @@ TEST(TomlTable, DotsInStringsCommentsAndListsAreNoNesting) {
 TEST(TomlTable, AFileOfMoreThanAMebibyteIsRefused) {
   EXPECT_EQ(complaint(std::string(1U << 20U, '\n')), "accepted");
   EXPECT_THAT(complaint(std::string((1U << 20U) + 1, '\n')), HasSubstr("rig.toml: more than 1048576 bytes"));
-  try {
-    (void)TomlTable::read_file("/dev/zero");
-    FAIL() << "accepted";
-  } catch (const ConfigError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("/dev/zero: more than"));
-  }
+  const test::TemporaryFolder folder;
+  const std::filesystem::path large = folder.path() / "large.toml";
+  std::ofstream(large) << std::string((1U << 20U) + 1, '\n');
+  EXPECT_THAT(refusal_of(large), HasSubstr("large.toml: more than 1048576 bytes"));
+}
+
+TEST(TomlTable, OnlyAPlainFileIsOpened) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path pipe = folder.path() / "pipe.toml";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::filesystem::path& file : {pipe, std::filesystem::path("/dev/zero"), folder.path()})
+    EXPECT_THAT(refusal_of(file), HasSubstr(file.string() + ": is not a file that can be read"));
 }
 
 }  // namespace
