@@ -214,10 +214,21 @@ struct TrainingViews::Intake {
   [[nodiscard]] std::filesystem::path file(std::size_t i) const {
     return set->images->folder() / set->images->views()[chosen[i]].file;
   }
+  /// Why `usable` views are too few, with what is wrong with the first of the others.
+  [[nodiscard]] std::string too_few(std::size_t usable) const {
+    const std::size_t needed = least_views(set->images->workspace());
+    std::string text = "has " + std::to_string(usable) + " view(s) of \"" + set->images->object() +
+                       "\" that can be used, of " + std::to_string(chosen.size()) + "; at least " +
+                       std::to_string(needed) + " are needed" +
+                       (needed == 3 ? " to close a turn" : " to span a range");
+    for (std::size_t i = 0; i < views.size(); ++i)
+      if (!views[i].reason.empty()) return text + "; " + file(i).filename().string() + " " + views[i].reason;
+    return text + ": acquire more";
+  }
 };
 
 TrainingViews::TrainingViews(std::span<const TrainingSet> sets, const ViewStoreOptions& options,
-                             const Progress& progress, std::stop_token stop)
+                             const Progress& progress, const std::stop_token& stop)
     : options_(options.normalization), length_(appearance_length(options_)) {
   if (sets.empty()) throw Error("there is no image set to learn from; import or acquire one");
   std::vector<Intake> intakes;
@@ -322,7 +333,6 @@ void TrainingViews::settle(Intake& intake, BadViews bad_views) {
   const ImageSet& images = *intake.set->images;
   const Kind usual = usual_kind(intake.views);
   std::vector<std::size_t> usable;
-  std::optional<std::size_t> first_bad;
   std::vector<std::vector<double>> poses;
   for (std::size_t i = 0; i < intake.views.size(); ++i) {
     TakenView& view = intake.views[i];
@@ -330,22 +340,14 @@ void TrainingViews::settle(Intake& intake, BadViews bad_views) {
       view.reason = "is " + view.kind.text() + ", most views of \"" + images.object() + "\" are " +
                     usual.text() + "; all views of an object must be alike: acquire it again";
     if (!view.reason.empty()) {
-      if (!first_bad) first_bad = i;
       leave_out({images.object(), intake.file(i), false, view.reason}, bad_views);
       continue;
     }
     usable.push_back(i);
     poses.push_back(images.views()[intake.chosen[i]].q);
   }
-  const std::size_t needed = least_views(images.workspace());
-  if (!intake.refused && usable.size() < needed)
-    intake.refused =
-        "has " + std::to_string(usable.size()) + " view(s) of \"" + images.object() +
-        "\" that can be used, of " + std::to_string(intake.chosen.size()) + "; at least " +
-        std::to_string(needed) + " are needed" + (needed == 3 ? " to close a turn" : " to span a range") +
-        (first_bad
-             ? "; " + intake.file(*first_bad).filename().string() + " " + intake.views[*first_bad].reason
-             : ": acquire more");
+  if (!intake.refused && usable.size() < least_views(images.workspace()))
+    intake.refused = intake.too_few(usable.size());
   LearnedGrid grid;
   if (!intake.refused) try {
       grid = find_learned_grid(images.workspace(), poses, images.object());

@@ -75,7 +75,7 @@ class TrainingViews final : public AppearanceSource {
   /// @throws FileError or Error naming the first of these with BadViews::refuse; Error when no object is
   /// left, or kept views are normalised in another way; Interrupted.
   TrainingViews(std::span<const TrainingSet> sets, const ViewStoreOptions& options, const Progress& progress,
-                std::stop_token stop);
+                const std::stop_token& stop);
   ~TrainingViews() override;
 
   [[nodiscard]] std::span<const ObjectViews> objects() const { return objects_; }

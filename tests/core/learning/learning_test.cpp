@@ -275,6 +275,16 @@ TEST_F(Learning, LeavesOutAnObjectOfWhichTooFewViewsAreLeftAndLearnsTheOthers) {
   EXPECT_THAT(refusal(BadViews::refuse), AllOf(HasSubstr("few"), HasSubstr("2 view(s)")));
 }
 
+TEST_F(Learning, NamesTheFirstViewThatCannotBeUsedWhereTooFewAreLeft) {
+  auto pictures = turn(4);
+  pictures[1] = cv::Mat(pictures[0].size(), pictures[0].type(), cv::Scalar::all(0));
+  pictures[3] = pictures[1];
+  write("few", pictures);
+  EXPECT_THAT(refusal(BadViews::leave_out),
+              AllOf(HasSubstr("2 view(s)"), HasSubstr("; 000001.png "), HasSubstr("nothing that stands out"),
+                    Not(HasSubstr("acquire more"))));
+}
+
 TEST_F(Learning, RefusesWhereNothingIsLeft) {
   write("one", turn(1));
   write("two", turn(2));
