@@ -24,7 +24,7 @@ struct CoilImportOptions {
 };
 
 /// Imports every `<object>__<number>.png` of `folder` into one image set an object below `root`. The number
-/// may have decimals (`mug__12.5.png`), and angles may be uneven or leave a gap, of which the report warns.
+/// may have decimals (`mug__12.5.png`), and angles may be uneven; the report warns of a gap.
 ///
 /// No other file may lie between them (hidden files apart). Everything is checked by name before the first
 /// picture is read.

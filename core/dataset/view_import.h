@@ -81,7 +81,7 @@ bool import_finished(const ImportObject& object, const std::filesystem::path& ro
 /// @param source a JSON object that says where the views come from; kept in each set.json. It is what "the
 /// same source" compares.
 /// @throws FileError naming a set that stands there, a picture that cannot be used (bad_views refuse), or an
-/// import of which nothing is left; what check_object_name throws; Interrupted. Sets finished before stay.
+/// import without any usable view; what check_object_name throws; Interrupted. Sets finished before stay.
 ImportReport import_views(const ViewImport& import, const std::filesystem::path& root,
                           const nlohmann::json& source, const Progress& progress = {},
                           const std::stop_token& stop = {});

@@ -16,7 +16,7 @@ namespace eigenpose {
 ///
 /// PNG, JPEG, TIFF, BMP, PBM, PGM and PPM are read, known by their content and not by their name, every other
 /// format is refused. For all of them:
-///  - a picture of which a pixel is missing or damaged is refused; bytes after its end are ignored;
+///  - a picture with a missing or damaged pixel is refused; bytes after its end are ignored;
 ///  - samples are scaled from the range of the format, grey of more than 8 bits to CV_16UC1, all else to
 ///    8 bits; gamma and colour profiles are ignored;
 ///  - what is transparent is black, which is background: samples are multiplied by their opacity;

@@ -208,7 +208,7 @@ struct TrainingViews::Intake {
   std::vector<std::size_t> chosen = {};     ///< views of an image set
   std::vector<TakenView> views = {};        ///< one a chosen view
   std::size_t first = 0;                    ///< where its views are put before it is known which can be used
-  std::size_t count = 0;                    ///< so many
+  std::size_t count = 0;                    ///< number of its views
   std::optional<std::string> refused = {};  ///< why none of them can be used
 
   [[nodiscard]] std::filesystem::path file(std::size_t i) const {

@@ -129,7 +129,7 @@ struct Share {
   }
 };
 
-/// Raises the scores of `count` queries and `vectors` vectors of views, the first of which has these biases.
+/// Raises the scores of `count` queries and `vectors` vectors of views; `biases` begin at the first one.
 template <std::size_t count, std::size_t vectors, template <std::size_t> class SomeViews>
 HWY_INLINE void raise(const SomeViews<vectors>& views, const std::int32_t* biases, const Share& share) {
   const Words d;

@@ -33,7 +33,7 @@ struct MatchCalibrationOptions {
 
 /// What the perturbed views of one object show.
 struct MatchEvidence {
-  std::size_t views = 0;          ///< of which each was perturbed once or more
+  std::size_t views = 0;          ///< views that were perturbed, each at least once
   double scale = 0.0;             ///< unit of its distances: their mean plus half the largest
   double typical_distance = 0.0;  ///< root mean square expected of new views
   std::vector<double> learned;    ///< squared distance of each view to the manifold through all views
