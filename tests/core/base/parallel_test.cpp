@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -41,6 +42,20 @@ TEST(ParallelFor, BeginsNothingAfterAnException) {
                             }),
                std::runtime_error);
   EXPECT_LE(begun, 4U) << "one a thread at most";
+}
+
+TEST(ParallelFor, TheThreadsThatDidNotFailStopToo) {
+  const tbb::global_control many(tbb::global_control::max_allowed_parallelism, 4);
+  constexpr std::size_t count = 3000;  // seconds of work, of which the failure leaves next to nothing
+  std::atomic<std::size_t> done{0};
+  EXPECT_THROW(parallel_for(count, 4,
+                            [&](std::size_t i) {
+                              if (i == 0) throw std::runtime_error("no");
+                              std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                              ++done;
+                            }),
+               std::runtime_error);
+  EXPECT_LT(done, count - 1);
 }
 
 TEST(ParallelFor, NeverUsesMoreThreadsThanItMay) {
