@@ -105,6 +105,20 @@ TEST(Normalizer, ReturnsTheEnergyAndZeroForBlack) {
   EXPECT_EQ(normalizer.normalize(cv::Mat(16, 16, CV_8UC1, cv::Scalar(3)), {5, 0, 0}, out), 0.0F);
 }
 
+TEST(Normalizer, ARangePixelCountsWhereHalfOfItsAreaWasMeasured) {
+  NormalizationOptions options = grey(8);
+  set_image_type(options, "range");
+  // Each pixel of the appearance is the mean of two by two; 0 is not measured.
+  cv::Mat distances = cv::Mat::zeros(16, 16, CV_16UC1);
+  for (int measured = 0; measured <= 4; ++measured)
+    for (int i = 0; i < measured; ++i)
+      distances.at<std::uint16_t>(i / 2, 2 * measured + i % 2) = static_cast<std::uint16_t>(1000 + 100 * i);
+  const auto appearance = appearance_of(distances, options);
+  const std::array expected{0.0F, 0.0F, 1050.0F, 1100.0F, 1150.0F};
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_NEAR(appearance[i], expected.at(i), 0.1F) << i << " of 4 measured";
+}
+
 TEST(Quantize, FillsTheRangeSoThatADimPictureKeepsItsShape) {
   const std::vector<float> dim{0.0F, 0.5F, 1.0F, 2.0F};
   std::vector<std::uint8_t> bytes(4);

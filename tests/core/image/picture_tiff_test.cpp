@@ -287,6 +287,16 @@ TEST(TiffFile, DifferencesAreAddedUp) {
   EXPECT_THAT(samples_of(file_of(wide, {0xff, 0xff, 0x00, 0x02}, true)), ElementsAre(CV_16UC1, 65535, 1));
 }
 
+TEST(TiffFile, DifferencesAreAddedUpInEachPlane) {
+  auto entries = one_strip(3, 1, 8, rgb, 9);
+  set(entries, 317, {2});
+  set(entries, 284, {2});
+  set(entries, 273, {8, 11, 14}, 4);
+  set(entries, 279, {3, 3, 3}, 4);
+  EXPECT_THAT(samples_of(file_of(entries, {10, 1, 255, 20, 2, 0, 30, 3, 1})),
+              ElementsAre(CV_8UC3, 10, 20, 30, 11, 22, 33, 10, 22, 34));
+}
+
 TEST(TiffFile, DataThatEndsEarlyIsTruncated) {
   const ByteList data{1, 2, 3, 4, 5, 6};
   EXPECT_THAT(refusal(file_of(one_strip(3, 2, 8, black_is_zero, 5), data)), HasSubstr("5 of 6 bytes"));

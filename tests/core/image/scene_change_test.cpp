@@ -234,6 +234,17 @@ TEST(SceneChange, ASteadyLampDoesNotFlicker) {
   EXPECT_EQ(fresh.flicker(), 0.0);
 }
 
+TEST(SceneChange, FlickerIsMeasuredAnewAfterAChange) {
+  SceneChange scene;
+  Film film(CV_8UC1, 0.0);
+  for (int k = 0; k < 40; ++k) scene.update(film.next(flickering(film.with_square(100), 0.08, 5.0, k)));
+  EXPECT_GT(scene.flicker(), 0.05);
+  scene.update(film.next(film.with_square(160)));
+  EXPECT_EQ(scene.flicker(), 0.0) << "what was measured belongs to another scene";
+  show(scene, film, film.with_square(160));
+  EXPECT_LT(scene.flicker(), 0.005);
+}
+
 TEST(SceneChange, ALampThatIsDimmedByAThirdIsAChange) {
   SceneChange scene;
   Film film(CV_8UC1, 0.6);
