@@ -67,6 +67,19 @@ TEST_F(TurnedImport, TurnsCounterClockwise) {
   EXPECT_LT(brightest.y, quarter.rows / 2) << "the right end points up after a quarter turn";
 }
 
+TEST_F(TurnedImport, WhatATurnUncoversIsBackground) {
+  import_turned(picture(), sets(), {.names = {"plate", "disc"}, .views = 8});
+  for (const char* part : {"plate", "disc"}) {
+    const ImageSet set = ImageSet::open(sets() / part);
+    for (std::size_t i = 0; i < set.views().size(); ++i) {
+      const cv::Mat view = set.load(i);
+      for (const int y : {0, view.rows - 1})
+        for (const int x : {0, view.cols - 1})
+          EXPECT_EQ(view.at<std::uint8_t>(y, x), 20) << part << ", view " << i << " at " << x << "," << y;
+    }
+  }
+}
+
 TEST_F(TurnedImport, NamesPartsFromLeftToRightItself) {
   EXPECT_THAT(import_turned(picture(), sets(), {.views = 2}), ElementsAre("part1", "part2"));
 }
