@@ -187,6 +187,18 @@ TEST(ManifoldFit, GoesThroughTheMeanOfEqualPoses) {
   EXPECT_NEAR(Manifold::fit(axes, poses, points, {.smoothing = 1e-6}).evaluate({{5.0}})(0), 2.0, 1e-4);
 }
 
+TEST(ManifoldFit, DoesNotDependOnHowOftenTheSamplesAreGiven) {
+  std::mt19937 random(7);
+  const std::vector<SampleAxis> axes{turn(12), line("x", 4)};
+  const Eigen::MatrixXd poses = scattered(axes, 60, random);
+  const Eigen::MatrixXd points = synthetic::random_matrix(3, 60, random);
+  const Manifold once = Manifold::fit(axes, poses, points, {.smoothing = 0.1});
+  const Manifold thrice =
+      Manifold::fit(axes, poses.replicate(1, 3).eval(), points.replicate(1, 3).eval(), {.smoothing = 0.1});
+  // Rounding of normal equations whose condition is far below 1e6.
+  EXPECT_LT((once.coefficients() - thrice.coefficients()).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 TEST(ManifoldFit, SmoothsMoreWhereAsked) {
   std::mt19937 random(6);
   const std::vector<SampleAxis> axes{turn(20)};

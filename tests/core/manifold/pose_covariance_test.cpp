@@ -41,6 +41,10 @@ TEST(PoseCovariance, IsInfiniteWhereNothingIsSeen) {
   EXPECT_NEAR(covariance[0], 0.25, 1e-12);
   EXPECT_EQ(covariance[1], 0.0);
   EXPECT_TRUE(std::isinf(covariance[3]));
+  // A point that lies exactly on the manifold has no residual; what is not seen stays unknown all the same.
+  set_covariance(information, 0.0, covariance);
+  EXPECT_EQ(covariance[0], 0.0);
+  EXPECT_TRUE(std::isinf(covariance[3]));
   std::array<double, 9> unseen{};
   set_unseen(3, unseen);
   EXPECT_TRUE(std::isinf(unseen[8]));

@@ -64,6 +64,20 @@ TEST_F(Resample, WritesAFileThatReadsBack) {
   EXPECT_EQ(row, 40);
 }
 
+TEST_F(Resample, QuotesANameThatACsvFieldCannotHoldAsItIs) {
+  for (const auto& [name, field] :
+       {std::pair("plain", "plain [deg]"), std::pair("a,b", "\"a,b [deg]\""),
+        std::pair("3\" arm", "\"3\"\" arm [deg]\""), std::pair("a\rb", "\"a\rb [deg]\"")}) {
+    const Manifold curve =
+        synthetic::smooth_manifold({synthetic::axis(name, 5, false, true, random_)}, 1, 2, random_, 2);
+    write_csv(folder_ / "curve.csv", curve, resample(curve, {{2}}));
+    std::ifstream in(folder_ / "curve.csv");
+    std::string line;
+    std::getline(in, line);
+    EXPECT_EQ(line, std::string(field) + ",e1\r");
+  }
+}
+
 TEST_F(Resample, RefusesCountsThatDoNotFit) {
   EXPECT_THROW(resample(surface_, {{10}}), std::invalid_argument);
   EXPECT_THROW(resample(surface_, {{10, 0}}), std::invalid_argument);

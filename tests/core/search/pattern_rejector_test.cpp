@@ -85,6 +85,32 @@ TEST(PatternRejector, RejectsMostOfThePatches) {
   EXPECT_LT(static_cast<double>(kept) / 500.0, 0.1 * static_cast<double>(search.patches()));
 }
 
+TEST(PatternRejector, EachBoundOfItsOptionsEndsTheDivision) {
+  std::mt19937 random(35);
+  const std::vector<Manifold> list = curves(40, random);
+  const PatchSet patches(list);
+  const auto components_with = [&](const auto& change) {
+    RejectorOptions options;
+    options.distance = 0.05;
+    change(options);
+    return PatternRejector(patches, options).components();
+  };
+  const std::size_t usual = components_with([](RejectorOptions&) {});
+  EXPECT_GT(usual, 50U);
+  EXPECT_EQ(components_with([](RejectorOptions& options) { options.max_depth = 0; }), 1U);
+  const std::size_t one_level = components_with([](RejectorOptions& options) { options.max_depth = 1; });
+  EXPECT_GT(one_level, 2U);
+  EXPECT_LE(one_level, 1 + RejectorOptions{}.cells) << "the root and its cells";
+  EXPECT_EQ(components_with([&](RejectorOptions& options) { options.small_set = patches.size(); }), 1U);
+  EXPECT_EQ(components_with([](RejectorOptions& options) { options.worthwhile = 0.0; }), 1U);
+  EXPECT_EQ(components_with([](RejectorOptions& options) { options.max_growth = 0.5; }), 1U);
+  EXPECT_LE(components_with([](RejectorOptions& options) {
+              options.cells = 2;
+              options.max_depth = 1;
+            }),
+            3U);
+}
+
 TEST(PatternRejector, RefusesOptionsOutOfRange) {
   std::mt19937 random(34);
   const std::vector<Manifold> list = curves(2, random);
