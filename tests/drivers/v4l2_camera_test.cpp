@@ -319,6 +319,18 @@ TEST_F(V4l2CameraTest, ClosesAStalledCameraAndOpensItAnew) {
   EXPECT_EQ(camera_->statistics().times_lost, 1U);
 }
 
+TEST_F(V4l2CameraTest, ACameraIsNotStalledWhileFramesComeHoweverLongItIsWaitedForInAll) {
+  open();
+  // Every frame comes after a wait; together they are far longer than a stall.
+  const TimePoint start = clock_.now();
+  while (clock_.now() - start < 10 * options_.stall_after) ASSERT_NO_THROW(next());
+  EXPECT_EQ(camera_->statistics().times_lost, 0U);
+  // Damaged frames are frames, too: the stream goes on.
+  system_->truncate(1000);
+  EXPECT_THROW(next(2 * options_.stall_after), DeviceTimeout);
+  EXPECT_EQ(camera_->statistics().times_lost, 0U);
+}
+
 TEST_F(V4l2CameraTest, WaitsInsideTheCallForTheCamerasReturn) {
   open();
   next();
