@@ -147,6 +147,24 @@ TEST_F(ModbusAxisTest, ADriveWithoutAHomedBitIsHomedOnlyByItsOwnDriver) {
   EXPECT_FALSE(elsewhere.state(soon()).homed) << "it ended elsewhere";
 }
 
+TEST_F(ModbusAxisTest, ADriveWithoutAHomedBitIsNotHomedAfterItsConnectionWasLost) {
+  SteadyClock clock;
+  ModbusProfile profile = oriental_motor_az_profile();
+  profile.homed.reset();
+  ModbusAxis axis(profile, rig_.options(), rig_.bus(), clock);
+  axis.home(soon(), {});
+  rig_.unplug();
+  EXPECT_THROW(axis.state(soon()), DeviceError);
+  rig_.plug_in();
+  // It may have been switched off meanwhile, and counts from anywhere.
+  EXPECT_THAT(failure_of([&] { axis.move_to(30.0, soon(), {}); }), HasSubstr("not homed"));
+  EXPECT_NEAR(rig_.true_position(), 0.0, 0.05) << "nothing has moved";
+  EXPECT_FALSE(axis.state(soon()).homed);
+  axis.home(soon(), {});
+  EXPECT_TRUE(axis.state(soon()).homed);
+  EXPECT_NEAR(axis.move_to(30.0, soon(), {}), 30.0, 0.05);
+}
+
 TEST_F(ModbusAxisTest, ALinearAxisKeepsItsEndsAndTakesNoShortCut) {
   SteadyClock clock;
   ModbusAxisOptions options = rig_.options();

@@ -371,6 +371,32 @@ TEST(ModbusOnASerialLine, AStopGoesOutToADriveThatCannotBeHeard) {
   while (rig.truly_moving()) std::this_thread::yield();
 }
 
+TEST(ModbusOnASerialLine, ASilentIntervalLiesBetweenTwoFrames) {
+  struct Case {
+    int baud;
+    Duration wanted;  ///< by the drive's profile
+    Duration least;   ///< the greater of that and of 3.5 characters of 11 bits, 1.75 ms above 19200 baud
+  };
+  for (const Case& line : {Case{1200, 0ms, 32ms}, Case{1200, 10ms, 32ms}, Case{1200, 60ms, 60ms},
+                           Case{115200, 0ms, 1750us}, Case{115200, 100ms, 100ms}}) {
+    ModbusRig rig(ModbusLine::rtu, 0.0);
+    rig.discard_axis();
+    rig.hang_up();
+    const SteadyClock clock;
+    ModbusBusOptions options;
+    options.endpoint =
+        ModbusRtuEndpoint{.device = rig.line(), .baud = line.baud, .silent_interval = line.wanted};
+    options.response_timeout = 10s;
+    ModbusBus bus(options, clock);
+    // No wait is ever cut short, whatever the machine does meanwhile; a line without the interval takes a
+    // millisecond a frame.
+    constexpr int frames = 5;
+    const TimePoint start = clock.now();
+    for (int i = 0; i < frames; ++i) (void)bus.read(table, 0x7F, 1, in(60s));
+    EXPECT_GE(clock.now() - start, (frames - 1) * line.least) << line.baud << " baud";
+  }
+}
+
 TEST_F(ModbusOnAnEchoingLine, ASilentDriveIsStillASilentDrive) {
   rig_.silence(true);
   EXPECT_THAT(failure_of<DeviceTimeout>([&] { rig_.axis().state(in(60s)); }), HasSubstr("no answer"));
