@@ -294,6 +294,40 @@ TEST(AptAxisOnAScript, EachStatusBitHasItsMeaning) {
   }
 }
 
+TEST(AptAxisOnAScript, AControllerIsSetUpAgainWhenItsLinkWasOpenedAnew) {
+  ScriptedAxis arm(1);
+  (void)arm.axis->state(soon());
+  (void)arm.axis->state(soon());
+  EXPECT_EQ(arm.set_ups, 1);
+  arm.answers = false;
+  EXPECT_THROW(arm.axis->state(soon()), DeviceTimeout);
+  arm.answers = true;
+  (void)arm.axis->state(soon());
+  EXPECT_EQ(arm.far_end->reopenings, 1);
+  EXPECT_EQ(arm.set_ups, 2) << "it may have been switched off meanwhile";
+  (void)arm.axis->state(soon());
+  EXPECT_EQ(arm.set_ups, 2);
+}
+
+TEST(AptAxisOnAScript, AnAnswerCountsOnlyWhereTheStreamStandsBetweenTwoMessages) {
+  ScriptedAxis arm(1);
+  (void)arm.axis->state(soon());
+  std::vector<std::uint8_t> behind;
+  arm.far_end->on_write = [&](std::span<const std::uint8_t> bytes) {
+    arm.hear(bytes);
+    if (bytes[0] == 0x90) arm.far_end->say(behind);
+  };
+  const std::vector<std::uint8_t> homed = {0x44, 0x04, 1, 0, 0x01, 0x50};
+  for (std::size_t size = 1; size < homed.size(); ++size) {
+    behind.assign(homed.begin(), homed.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_THROW(arm.axis->state(soon()), DeviceError) << size;
+  }
+  behind = homed;
+  EXPECT_TRUE(arm.axis->state(soon()).homed) << "a whole message may follow";
+  behind.clear();
+  EXPECT_TRUE(arm.axis->state(soon()).homed);
+}
+
 TEST(AptAxisOnAScript, BytesWithoutEndAreNoAnswer) {
   for (const std::vector<std::uint8_t>& bytes :
        {std::vector<std::uint8_t>{0x44, 0x04, 1, 0, 0x01, 0x50},  // "homed", again and again
