@@ -238,8 +238,20 @@ TEST(Config, RelativePathsStartAtTheFilesFolder) {
 
 TEST(Config, ASocketModeIsOctalAndLeavesTheOwnerIn) {
   EXPECT_THAT(refusal("[api]\ncontrol_mode = \"rw\"\n"), HasSubstr("\"0600\" to \"0777\""));
-  EXPECT_THAT(refusal("[api]\ncontrol_mode = \"0066\"\n"), HasSubstr("owner"));
-  EXPECT_EQ(parse_config("[api]\ncontrol_mode = \"0600\"\n", "rig.toml").api.control_mode, 0600U);
+  for (const std::string key : {"results_mode", "control_mode"})
+    for (unsigned owner = 0; owner <= 8; ++owner) {
+      const std::string text = "[api]\n" + key + " = \"0" + std::to_string(owner) + "40\"\n";
+      if (owner == 8)
+        EXPECT_THAT(refusal(text), HasSubstr("no file mode"));
+      else if (owner < 6)
+        EXPECT_THAT(refusal(text), HasSubstr("owner needs to read and write")) << text;
+      else
+        EXPECT_EQ(refusal(text), "accepted") << text;
+    }
+  const ApiOptions api =
+      parse_config("[api]\nresults_mode = \"0777\"\ncontrol_mode = \"0600\"\n", "rig.toml").api;
+  EXPECT_EQ(api.results_mode, 0777U);
+  EXPECT_EQ(api.control_mode, 0600U);
 }
 
 }  // namespace

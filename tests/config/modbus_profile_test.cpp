@@ -161,6 +161,35 @@ TEST(ModbusProfile, EveryNumberIsTakenUpToBothItsBoundsAndNotBeyond) {
   EXPECT_EQ(complaint(with("bits = 32\n", "bits = 32\nhome_steps = -2147483648\n")), "no complaint");
 }
 
+TEST(ModbusProfile, WhatIsLeftOutIsAsForEveryDrive) {
+  const auto read = [](const std::string& tables) {
+    return parse_modbus_profile(with("[position]\n", tables + "[position]\n"), "drive.toml");
+  };
+  const AxisDefaults usual;
+  // Each table with one key alone: the others keep their defaults, and so does a profile without the table.
+  for (const std::string key :
+       {"", "steps_per_unit", "speed", "acceleration", "arrival_tolerance", "watchdog_ms"}) {
+    const AxisDefaults defaults = read(key.empty() ? "" : "[defaults]\n" + key + " = 7\n").defaults;
+    EXPECT_EQ(defaults.steps_per_unit, key == "steps_per_unit" ? 7.0 : usual.steps_per_unit) << key;
+    EXPECT_EQ(defaults.speed, key == "speed" ? 7.0 : usual.speed) << key;
+    EXPECT_EQ(defaults.acceleration, key == "acceleration" ? 7.0 : usual.acceleration) << key;
+    EXPECT_EQ(defaults.arrival_tolerance, key == "arrival_tolerance" ? 7.0 : usual.arrival_tolerance) << key;
+    EXPECT_EQ(defaults.watchdog,
+              key == "watchdog_ms" ? Duration(std::chrono::milliseconds(7)) : usual.watchdog)
+        << key;
+  }
+  EXPECT_GT(usual.watchdog, Duration{}) << "a drive left alone stops by itself";
+  const ModbusProfile plain = read("");
+  EXPECT_TRUE(plain.position.is_signed);
+  EXPECT_TRUE(plain.moving.active) << "a status bit says what it is called when it is set";
+  EXPECT_EQ(plain.serial.silent_interval, Duration{});
+  const ModbusProfile serial = read("[serial]\nbaud = 9600\nparity = \"odd\"\nstop_bits = 2\n");
+  EXPECT_EQ(serial.serial.baud, 9600);
+  EXPECT_EQ(serial.serial.parity, 'O');
+  EXPECT_EQ(serial.serial.stop_bits, 2);
+  EXPECT_EQ(serial.serial.silent_interval, Duration{});
+}
+
 TEST(ModbusProfile, WhatWouldBeDangerousIsRefused) {
   EXPECT_THAT(complaint(with("stop = [{ register = 1, values = [\"2:16\"] }]", "")),
               HasSubstr("no stop command"));

@@ -279,6 +279,18 @@ TEST(TomlTable, DotsInStringsCommentsAndListsAreNoNesting) {
   EXPECT_EQ(complaint(list + "]"), "accepted");
 }
 
+TEST(TomlTable, NestingIsBoundedBehindEveryKindOfString) {
+  std::string deep = "a";
+  for (int i = 0; i < 33; ++i) deep += ".a";
+  for (const std::string text : {"'x\\'", "'\\'", "\"x\\\\\"", "\"\\\"\"", "\"it's\"", "'say \"'", "''",
+                                 "\"\"", "'''x\\'''", "\"\"\"x\\\\\"\"\"", "'''it's'''", "\"\"\"\"x\"\"\""}) {
+    EXPECT_EQ(complaint("k = " + text + "\n"), "accepted") << text;
+    EXPECT_THAT(complaint("k = " + text + "\n" + deep + " = 1\n"),
+                AllOf(StartsWith("rig.toml:2: "), HasSubstr("joins more than 33 names")))
+        << text;
+  }
+}
+
 TEST(TomlTable, AFileOfMoreThanAMebibyteIsRefused) {
   EXPECT_EQ(complaint(std::string(1U << 20U, '\n')), "accepted");
   EXPECT_THAT(complaint(std::string((1U << 20U) + 1, '\n')), HasSubstr("rig.toml: more than 1048576 bytes"));
