@@ -81,6 +81,22 @@ TEST_F(Replay, SeveralObjectsLieOverEachOtherAtTheirPlaces) {
   EXPECT_EQ(both.at<std::uint8_t>(20, 46), 150);
 }
 
+TEST_F(Replay, AnObjectLiesWhereTheCameraSeesItsPlace) {
+  ReplayCamera camera = opened();
+  struct Place {
+    double x_mm, y_mm;
+    int dx, dy;  ///< pixels: 64 for 300 mm, and in the depth of the table sin(32°) of that, upwards
+  };
+  for (const Place& place : {Place{0, 0, 0, 0}, Place{75, 0, 16, 0}, Place{-75, 0, -16, 0},
+                             Place{0, 100, 0, -11}, Place{0, -100, 0, 11}, Place{60, -60, 13, 7}}) {
+    lab.clear();
+    lab.place("thing1", {}, place.x_mm, place.y_mm);
+    cv::Mat expected(48, 64, CV_8UC1, cv::Scalar(4));
+    expected(cv::Rect(24 + place.dx, 16 + place.dy, 16, 16)).setTo(50);
+    EXPECT_EQ(cv::norm(picture(camera), expected, cv::NORM_INF), 0.0) << place.x_mm << "," << place.y_mm;
+  }
+}
+
 TEST_F(Replay, NoiseDiffersFromFrameToFrame) {
   ReplayCamera camera = opened(2.0);
   lab.place("thing2");

@@ -92,5 +92,20 @@ TEST(Trajectory, RunsOnUntilItIsStopped) {
   EXPECT_NEAR(stopped.position(stopped.end()), running.position(later) - 12.5, 1e-6);
 }
 
+TEST(Trajectory, SpeedsUpAtItsAccelerationAndSlowsDownAtItsDeceleration) {
+  const TimePoint later = begin + std::chrono::seconds(10);
+  for (const int direction : {1, -1}) {
+    const auto running = Trajectory::standstill(0.0, begin).run(direction, {50.0, 100.0, 20.0}, begin);
+    EXPECT_NEAR(running.velocity(begin + milliseconds(250)), direction * 25.0, 1e-9);
+    const auto faster = running.run(direction, {90.0, 100.0, 20.0}, later);
+    EXPECT_NEAR(faster.velocity(later + milliseconds(200)), direction * 70.0, 1e-9);
+    const auto slower = running.run(direction, {10.0, 100.0, 20.0}, later);
+    EXPECT_NEAR(slower.velocity(later + milliseconds(500)), direction * 40.0, 1e-9);
+    EXPECT_NEAR(slower.velocity(later + std::chrono::seconds(3)), direction * 10.0, 1e-9);
+    const auto stopped = running.stop(20.0, later);
+    EXPECT_NEAR(stopped.velocity(later + milliseconds(500)), direction * 40.0, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace eigenpose::sim
