@@ -144,6 +144,26 @@ TEST(EnttecDmxWidget, BytesWithoutEndAreNoAnswer) {
   }
 }
 
+TEST(DmxWidgetInTheLab, EveryFrameIsTheWholeUniverse) {
+  sim::DmxWidget widget;
+  const auto send = [&](std::size_t channels, std::uint8_t value) {
+    std::vector<std::uint8_t> bytes = {0x7E, 6, static_cast<std::uint8_t>((channels + 1) & 0xFFU),
+                                       static_cast<std::uint8_t>((channels + 1) >> 8U), 0};
+    bytes.insert(bytes.end(), channels, value);
+    bytes.push_back(0xE7);
+    (void)widget.receive(bytes);
+  };
+  send(512, 200);
+  EXPECT_EQ(widget.channel(512), 200);
+  send(24, 7);
+  EXPECT_EQ(widget.channel(24), 7);
+  EXPECT_EQ(widget.channel(25), 0) << "what a shorter frame does not name goes dark";
+  send(23, 9);
+  EXPECT_EQ(widget.channel(1), 7) << "the widget sends no frame of fewer than 24 channels";
+  send(513, 9);
+  EXPECT_EQ(widget.channel(1), 7) << "nor one of more than 512";
+}
+
 TEST(EnttecDmxLamp, SendsNoFrameBeforeItIsAskedTo) {
   DmxRig rig({});
   rig.discard_lamp();
