@@ -297,6 +297,46 @@ TEST(Solver, ChoosesTheGramMatrixForFewViewsAndKrylovWhereItDoesNotFit) {
   EXPECT_EQ(report.solver, "krylov");
 }
 
+/// Views that have to be read, as those of a file.
+class BytesToRead final : public AppearanceSource {
+ public:
+  BytesToRead(std::size_t count, std::size_t length)
+      : bytes_(test::smooth_views(count, length, 11), length) {}
+  [[nodiscard]] std::size_t count() const override { return bytes_.count(); }
+  [[nodiscard]] std::size_t length() const override { return bytes_.length(); }
+  [[nodiscard]] bool has_bytes() const override { return true; }
+  void read(std::size_t first, Eigen::Ref<Eigen::MatrixXf> tile) const override { bytes_.read(first, tile); }
+  void read_bytes(std::size_t first, std::size_t n, std::uint8_t* tile) const override {
+    bytes_.read_bytes(first, n, tile);
+  }
+
+ private:
+  OwnedBytes bytes_;
+};
+
+TEST(Solver, EveryMemoryLimitBeyondTheLeastIsEnoughForKrylov) {
+  for (const auto& [count, length] : {std::pair<std::size_t, std::size_t>(40, 900), {300, 40}}) {
+    const BytesToRead source(count, length);
+    bool enough = false;
+    for (double limit = 10e3; limit < 4e6; limit *= 1.03) {
+      SolverOptions options;
+      options.solver = "krylov";
+      options.components = 4;
+      options.threads = 1;
+      options.memory_limit = static_cast<std::size_t>(limit);
+      try {
+        SolverReport report;
+        EXPECT_EQ(solve_eigenspace(source, options, &report).components(), 4) << limit;
+        enough = true;
+      } catch (const std::invalid_argument& refused) {
+        EXPECT_FALSE(enough) << limit << " bytes: " << refused.what();
+        EXPECT_NE(std::string(refused.what()).find("holds no solver"), std::string::npos) << refused.what();
+      }
+    }
+    EXPECT_TRUE(enough);
+  }
+}
+
 TEST(Solver, RefusesAnAnswerWhoseResidualIsTooLargeForTheGap) {
   EigenPairs pairs;
   pairs.values = Eigen::Vector2d(10.0, 5.0);
