@@ -1,6 +1,8 @@
 #include "core/base/linear_algebra.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -19,36 +21,61 @@ SymmetricEigen symmetric_eigen(const Eigen::Ref<const MatrixXd>& matrix) {
   return {solver.eigenvalues().reverse(), solver.eigenvectors().rowwise().reverse()};
 }
 
-LeftSingular left_singular(const Eigen::Ref<const MatrixXd>& columns, double least) {
-  const Index thin = std::min(columns.rows(), columns.cols());
-  const Eigen::HouseholderQR<MatrixXd> qr(columns);
-  const MatrixXd triangle = qr.matrixQR().topRows(thin).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<MatrixXd> svd(triangle, Eigen::ComputeThinU);
+namespace {
+
+/// R of columns = Q R, square: one row a column.
+MatrixXd square_triangle(const Eigen::HouseholderQR<MatrixXd>& qr) {
+  return qr.matrixQR().topRows(qr.cols()).triangularView<Eigen::Upper>();
+}
+
+/// Left singular vectors whose singular values are at least max(least, relative · largest value).
+LeftSingular left_singular_above(const Eigen::Ref<const MatrixXd>& columns, double least, double relative) {
+  // Of a square matrix, so that no further QR is compiled to make it one.
+  using Svd = Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner>;
+  const bool wide = columns.cols() > columns.rows();
+  const Eigen::HouseholderQR<MatrixXd> qr(wide ? MatrixXd(columns.transpose()) : MatrixXd(columns));
+  // Of a wide matrix Rᵀ Qᵀ, the left vectors are those of Rᵀ; of a tall one Q R, they are Q times those of R.
+  MatrixXd triangle = square_triangle(qr);
+  if (wide) triangle.transposeInPlace();
+  const Svd svd(triangle, Eigen::ComputeFullU);
+  const VectorXd& values = svd.singularValues();
+  const double bound = values.size() == 0 ? least : std::max(least, relative * values[0]);
   Index kept = 0;
-  while (kept < thin && svd.singularValues()[kept] >= least) ++kept;
+  while (kept < values.size() && values[kept] >= bound) ++kept;
+  if (wide) return {svd.matrixU().leftCols(kept), values};
   MatrixXd vectors = MatrixXd::Zero(columns.rows(), kept);
-  vectors.topRows(thin) = svd.matrixU().leftCols(kept);
+  vectors.topRows(columns.cols()) = svd.matrixU().leftCols(kept);
   vectors.applyOnTheLeft(qr.householderQ());
-  return {std::move(vectors), svd.singularValues()};
+  return {std::move(vectors), values};
+}
+
+/// The matrix norm that goes with the 1-norm of vectors; no number where an element is none.
+double largest_column_sum(const Eigen::Ref<const MatrixXd>& matrix) {
+  return matrix.cwiseAbs().colwise().sum().maxCoeff<Eigen::PropagateNaN>();
+}
+
+}  // namespace
+
+LeftSingular left_singular(const Eigen::Ref<const MatrixXd>& columns, double least) {
+  return left_singular_above(columns, least, 0.0);
 }
 
 MatrixXd orthonormal_span(const Eigen::Ref<const MatrixXd>& columns, double threshold) {
-  Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
-  qr.setThreshold(threshold);
-  return qr.householderQ() * MatrixXd::Identity(columns.rows(), qr.rank());
+  // A matrix of zeros spans nothing: its largest singular value, 0, is no direction.
+  return left_singular_above(columns, std::numeric_limits<double>::min(), threshold).vectors;
 }
 
 void orthonormalize_columns(MatrixXd& columns) {
-  const MatrixXd overlap = columns.transpose() * columns;
-  const Eigen::LLT<MatrixXd> factor(overlap);
-  factor.matrixU().solveInPlace<Eigen::OnTheRight>(columns);
-}
-
-std::optional<VectorXd> solve_positive_definite(const Eigen::Ref<const MatrixXd>& matrix,
-                                                const Eigen::Ref<const VectorXd>& right) {
-  const Eigen::LLT<MatrixXd> factor(matrix);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  return factor.solve(right);
+  MatrixXd overlap = columns.transpose() * columns;
+  const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(overlap);
+  // Rows of columns · L⁻ᵀ, some at a time: the transposed copy stays small.
+  constexpr Index tile = 256;
+  for (Index row = 0; row < columns.rows(); row += tile) {
+    const Index rows = std::min(tile, columns.rows() - row);
+    MatrixXd turned = columns.middleRows(row, rows).transpose();
+    factor.matrixL().solveInPlace(turned);
+    columns.middleRows(row, rows) = turned.transpose();
+  }
 }
 
 std::optional<MatrixXd> solve_positive_definite_in_place(MatrixXd& matrix,
@@ -69,9 +96,13 @@ MatrixXd solve_square(const Eigen::Ref<const MatrixXd>& matrix, const Eigen::Ref
 }
 
 std::optional<MatrixXd> inverse_of(const Eigen::Ref<const MatrixXd>& matrix) {
-  const Eigen::FullPivLU<MatrixXd> lu(matrix);
-  if (!lu.isInvertible()) return std::nullopt;
-  return lu.inverse();
+  const Index size = matrix.rows();
+  MatrixXd inverse = solve_square(matrix, MatrixXd::Identity(size, size));
+  // ‖A‖ ‖A⁻¹‖, largest sums of columns. A pivot of zero leaves infinities or no numbers at all.
+  const double condition = largest_column_sum(matrix) * largest_column_sum(inverse);
+  const double rounding = static_cast<double>(size) * std::numeric_limits<double>::epsilon();
+  if (!(condition * rounding < 1.0)) return std::nullopt;
+  return inverse;
 }
 
 }  // namespace eigenpose

@@ -2,9 +2,9 @@
 
 /// Decompositions of dense matrices in double.
 ///
-/// Eigen's decompositions are templates that compile for seconds wherever they are named. Here each is
-/// compiled once. Only linear_algebra.cpp includes their headers; everybody else includes <Eigen/Core> and
-/// this.
+/// Eigen's decompositions are templates that compile for seconds wherever they are named, and again for each
+/// type of argument. Here few of them are compiled once, for one type. Only linear_algebra.cpp includes their
+/// headers; everybody else includes <Eigen/Core> and this.
 
 #include <optional>
 
@@ -31,20 +31,16 @@ struct LeftSingular {
 /// small triangle, and small singular values keep their digits, which the product of the columns would lose.
 LeftSingular left_singular(const Eigen::Ref<const Eigen::MatrixXd>& columns, double least);
 
-/// An orthonormal basis of the columns' span. Columns shorter than `threshold` times the longest, once the
-/// others are taken off, do not count as directions.
+/// An orthonormal basis of the columns' span: the left singular vectors whose singular value is at least
+/// `threshold` times the largest and not zero.
 Eigen::MatrixXd orthonormal_span(const Eigen::Ref<const Eigen::MatrixXd>& columns, double threshold);
 
 /// Gram-Schmidt in the order of the columns, by Cholesky of their products: for columns that are almost
 /// orthonormal already.
 void orthonormalize_columns(Eigen::MatrixXd& columns);
 
-/// The solution of a symmetric positive definite system (Cholesky); none where the matrix is not positive
-/// definite.
-std::optional<Eigen::VectorXd> solve_positive_definite(const Eigen::Ref<const Eigen::MatrixXd>& matrix,
-                                                       const Eigen::Ref<const Eigen::VectorXd>& right);
-
-/// The same for many right sides. Only the lower triangle of `matrix` is read; it is overwritten.
+/// The solution of a symmetric positive definite system for each right side (Cholesky); none where the matrix
+/// is not positive definite. Only the lower triangle of `matrix` is read; it is overwritten.
 std::optional<Eigen::MatrixXd> solve_positive_definite_in_place(
     Eigen::MatrixXd& matrix, const Eigen::Ref<const Eigen::MatrixXd>& right);
 
@@ -60,7 +56,8 @@ SymmetricSolution solve_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& matri
 Eigen::MatrixXd solve_square(const Eigen::Ref<const Eigen::MatrixXd>& matrix,
                              const Eigen::Ref<const Eigen::MatrixXd>& right);
 
-/// The inverse of a square matrix (LU with full pivoting); none where it is singular up to rounding.
+/// The inverse of a square matrix (LU with row pivoting); none where it is not finite or singular up to
+/// rounding: where its condition number ‖A‖ ‖A⁻¹‖ times n times the machine's precision reaches 1.
 std::optional<Eigen::MatrixXd> inverse_of(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 
 }  // namespace eigenpose

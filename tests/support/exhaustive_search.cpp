@@ -145,12 +145,12 @@ class NewtonDescent {
     for (; damping < 1e12; damping *= 10.0) {
       Eigen::MatrixXd damped = hessian_;
       damped.diagonal() += damping * (gauss_.diagonal().array() + 1e-12 * (1.0 + gauss_.trace())).matrix();
-      const auto solved = solve_positive_definite(damped, gradient_);
+      const auto solved = solve_positive_definite_in_place(damped, gradient_);
       if (!solved) continue;
       std::vector<double> next = q;
       for (std::size_t a = 0; a < q.size(); ++a) {
         const auto i = static_cast<Eigen::Index>(a);
-        next[a] -= std::clamp((*solved)[i], -1.0, 1.0) * unit_[i];
+        next[a] -= std::clamp((*solved)(i, 0), -1.0, 1.0) * unit_[i];
       }
       clamp(next);
       const double trial = squared_distance(next);
