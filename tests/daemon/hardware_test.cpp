@@ -1,10 +1,12 @@
 /// The operator's hands and eyes: limits of jogging, and what the doctor says of a machine.
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -269,10 +271,16 @@ TEST_F(CheckupTest, FindsAPortWhoseNameHasColonsOfItsOwn) {
 TEST_F(CheckupTest, MissesTheServicesUserAndItsGroups) {
   EXPECT_THAT(on("service user").at(0).remedy, HasSubstr("systemd-sysusers"));
   put("etc/passwd", "root:x:0:0::/root:/bin/sh\neigenpose:x:990:990::/var/lib/eigenpose:/usr/sbin/nologin");
-  put("etc/group", "video:x:44:lab,eigenpose\ndialout:x:20:lab");
-  const auto found = on("service user");
-  ASSERT_EQ(found.size(), 1U);
-  EXPECT_THAT(found[0].what, HasSubstr("'dialout'"));
+  for (const char* others : {"", "lab", "eigenpose2", "lab,noeigenpose", "eigenpose-test,lab"}) {
+    put("etc/group", std::string("video:x:44:lab,eigenpose\ndialout:x:20:") + others);
+    const auto found = on("service user");
+    ASSERT_EQ(found.size(), 1U) << others;
+    EXPECT_THAT(found[0].what, HasSubstr("'dialout'")) << others;
+  }
+  for (const char* members : {"eigenpose", "eigenpose,lab", "lab,eigenpose"}) {
+    put("etc/group", std::string("video:x:44:eigenpose\ndialout:x:20:") + members);
+    EXPECT_TRUE(on("service user").empty()) << members;
+  }
 }
 
 TEST_F(CheckupTest, LooksAtWhatIsPluggedInWhereThereIsNoConfiguration) {
@@ -354,6 +362,52 @@ TEST_F(CheckupTest, ACameraWithoutAPictureIsToldFromADriveAndADamagedOneFromASil
     EXPECT_THAT(all[1].remedy, testing::Not(HasSubstr("drive")));
     EXPECT_THAT(all[1].remedy, HasSubstr(damaged > 0 ? "another cable" : "trigger"));
   }
+}
+
+/// A camera that always gives the same picture.
+class StillCamera final : public Camera {
+ public:
+  explicit StillCamera(cv::Mat picture) : picture_(std::move(picture)) {}
+  [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  Frame next_frame(TimePoint, std::stop_token) override {
+    Frame frame;
+    frame.image = picture_;
+    return frame;
+  }
+  [[nodiscard]] CameraStatistics statistics() const override { return {}; }
+
+ private:
+  cv::Mat picture_;
+  CameraInfo info_;
+};
+
+TEST_F(CheckupTest, ABlackAndASaturatedPictureAreToldFromAGoodOneInEveryDepth) {
+  struct Case {
+    double level;      ///< of most pixels, as a share of the largest value
+    double saturated;  ///< share of the pixels
+    Health health;
+    const char* what;
+  };
+  for (const Case& seen :
+       {Case{0.0, 0.0, Health::note, "black"}, Case{0.1, 0.0, Health::good, "mean level 10 %"},
+        Case{0.1, 0.03, Health::good, "3.0 % saturated"},
+        Case{0.1, 0.1, Health::note, "10 % of it is saturated"},
+        Case{1.0, 1.0, Health::note, "100 % of it is saturated"}})
+    for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1}) {
+      const double full = CV_MAT_DEPTH(type) == CV_16U ? 65535.0 : 255.0;
+      cv::Mat picture(100, 100, type, cv::Scalar::all(std::round(full * seen.level)));
+      picture.rowRange(0, static_cast<int>(std::lround(100 * seen.saturated))).setTo(cv::Scalar::all(full));
+      Devices devices;
+      devices.camera = [picture] { return std::make_unique<StillCamera>(picture); };
+      std::vector<Finding> all;
+      const SteadyClock clock;
+      check_devices(devices, clock, {}, [&](const Finding& finding) { all.push_back(finding); });
+      ASSERT_EQ(all.back().subject, "picture");
+      EXPECT_EQ(all.back().health, seen.health) << seen.what << ", type " << type;
+      if (seen.health == Health::note || seen.saturated == 0.03) {
+        EXPECT_THAT(all.back().what, HasSubstr(seen.what)) << "type " << type;
+      }
+    }
 }
 
 TEST_F(CheckupTest, TellsAnAlarmInTheDrivesWords) {
