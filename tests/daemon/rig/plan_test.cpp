@@ -35,11 +35,17 @@ std::string plan_refusal(const PlanRequest& request) {
 
 TEST(Plan, AFullTurnLeavesOutTheEndThatIsTheBeginning) {
   EXPECT_THAT(spaced_positions(table, {0, 360, 4}), ElementsAre(0, 90, 180, 270));
+  EXPECT_THAT(spaced_positions(table, {90, 450, 4}), ElementsAre(90, 180, 270, 0)) << "from anywhere";
+  EXPECT_THAT(spaced_positions(table, {360, 0, 4}), ElementsAre(0, 270, 180, 90)) << "backwards";
+  EXPECT_THAT(spaced_positions(table, {0, -360, 3}), ElementsAre(0, 240, 120));
+  EXPECT_THAT(spaced_positions(table, {0, 360, 1}), ElementsAre(0));
 }
 
 TEST(Plan, APartOfATurnAndAnOpenAxisIncludeTheEnd) {
   EXPECT_THAT(spaced_positions(table, {0, 90, 4}), ElementsAre(0, 30, 60, 90));
+  EXPECT_THAT(spaced_positions(table, {90, 0, 4}), ElementsAre(90, 60, 30, 0));
   EXPECT_THAT(spaced_positions(slide, {-10, 10, 3}), ElementsAre(-10, 0, 10));
+  EXPECT_THAT(spaced_positions(slide, {10, -10, 3}), ElementsAre(10, 0, -10));
 }
 
 TEST(Plan, VisitsEveryCombinationOnceWithTheLastAxisFastest) {
