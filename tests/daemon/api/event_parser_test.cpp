@@ -45,6 +45,17 @@ TEST(EventParser, GivesNoEventThatIsNotCompleteOrHasNoData) {
   EXPECT_TRUE(events_of("id: 1\nevent: result\n\n", 5).empty());
 }
 
+TEST(EventParser, AnEventHasNothingOfTheOneBeforeButItsId) {
+  const auto events =
+      events_of("id: 3f29ab01-7\nevent: result\ndata: one\n\ndata: two\n\nevent: lost\n\ndata:\n\n", 9);
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(events[1].name, "");
+  EXPECT_EQ(events[1].data, "two");
+  EXPECT_EQ(events[1].id, 7U);
+  EXPECT_EQ(events[2].name, "") << "of an event without data, which is none";
+  EXPECT_EQ(events[2].data, "");
+}
+
 TEST(EventParser, StopsWhenItsReaderHasEnough) {
   EventParser parser;
   int seen = 0;
