@@ -13,6 +13,7 @@ namespace {
 
 std::vector<Manifold> curves(int count, std::mt19937& random) {
   std::vector<Manifold> list;
+  list.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) list.push_back(synthetic::smooth_curve(24, 16, 2, random, i % 3 == 0));
   return list;
 }
