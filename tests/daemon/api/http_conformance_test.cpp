@@ -209,6 +209,25 @@ TEST_F(HttpConformance, TheTimeForARequestIsForAllOfIt) {
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 408 "));
 }
 
+TEST_F(HttpConformance, TheTimeForARequestBeginsWithItsFirstByte) {
+  ServerOptions options;
+  options.request_timeout = milliseconds(400);
+  start(options);
+  std::string answer;
+  std::chrono::steady_clock::time_point first_byte;
+  // On a machine that is held up for so long that the idle connection is closed: another one.
+  for (int tries = 0; answer.empty() && tries < 50; ++tries) {
+    const RawClient client(socket_.path());
+    std::this_thread::sleep_for(options.request_timeout / 2);
+    first_byte = std::chrono::steady_clock::now();
+    client.send("GET / HTTP/1.1\r\n");
+    answer = client.read_all();
+  }
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 408 "));
+  // The server cannot have begun before the byte was sent; how much later it was, no test says.
+  EXPECT_GE(std::chrono::steady_clock::now() - first_byte, options.request_timeout);
+}
+
 TEST_F(HttpConformance, AConnectionOnWhichNothingComesIsClosedWithoutAWord) {
   ServerOptions options;
   options.request_timeout = milliseconds(50);

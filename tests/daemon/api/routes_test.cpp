@@ -381,6 +381,26 @@ TEST_F(Routes, CommandsAndStopsHaveLanesOfTheirOwn) {
   EXPECT_EQ(lane("DELETE", "/nowhere"), Lane::read);
 }
 
+TEST_F(Routes, EachKindOfFaultHasItsStatus) {
+  const auto answer_to = [](const auto& error) { return error_response(std::make_exception_ptr(error)); };
+  for (const auto& [fault, status] :
+       {std::pair(Fault::invalid_request, 400), std::pair(Fault::not_found, 404),
+        std::pair(Fault::conflict, 409), std::pair(Fault::busy, 409), std::pair(Fault::interrupted, 409),
+        std::pair(Fault::unavailable, 503), std::pair(Fault::device, 503), std::pair(Fault::file, 500),
+        std::pair(Fault::internal, 500)}) {
+    EXPECT_EQ(http_status(fault), status) << static_cast<int>(fault);
+    EXPECT_EQ(answer_to(ServiceError(fault, "what", "hint")).status, status) << static_cast<int>(fault);
+  }
+  EXPECT_EQ(answer_to(DeviceTimeout("table", "move", "late")).status, 503);
+  EXPECT_EQ(answer_to(DeviceError("table", "move", "alarm")).status, 503);
+  EXPECT_EQ(answer_to(Interrupted()).status, 409);
+  EXPECT_EQ(answer_to(ConfigError("no such axis")).status, 400);
+  EXPECT_EQ(answer_to(UnsupportedMediaType("what", "hint")).status, 415);
+  const Response full = answer_to(FileError("/s/model.h5", "cannot be written: the disk is full"));
+  EXPECT_EQ(full.status, 500);
+  EXPECT_THAT(error_of(full), HasSubstr("the disk is full")) << "the operator can do something about it";
+}
+
 TEST_F(Routes, AnInternalFaultBlamesNobodyAndKeepsItsDetailInTheLog) {
   const auto answer_to = [](const auto& error) { return error_response(std::make_exception_ptr(error)); };
   for (const Response& response :

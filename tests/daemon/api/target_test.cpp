@@ -1,5 +1,9 @@
 #include "daemon/api/target.h"
 
+#include <string>
+#include <string_view>
+#include <variant>
+
 #include <gtest/gtest.h>
 
 namespace eigenpose {
@@ -52,6 +56,22 @@ TEST(Target, ResolvesDotSegmentsAlsoWhenTheyAreEncoded) {
   EXPECT_EQ(accepted_target("/v1/status/.").path, "/v1/status/");
   EXPECT_EQ(accepted_target("/v1/..").path, "/");
   EXPECT_EQ(accepted_target("/v1/..status").path, "/v1/..status");
+}
+
+TEST(Target, ReadsNothingBehindItsEnd) {
+  // The parser hands out a piece of what has been received: behind it stands something else.
+  const std::string received = "/v1/%41%42?a=%43&%44=1";
+  for (std::size_t size = 0; size <= received.size(); ++size) {
+    const auto piece = parse_target(std::string_view(received).substr(0, size), "GET");
+    const auto alone = parse_target(received.substr(0, size), "GET");
+    ASSERT_EQ(piece.index(), alone.index()) << received.substr(0, size);
+    if (const auto* target = std::get_if<Target>(&piece)) {
+      EXPECT_EQ(target->path, std::get<Target>(alone).path);
+      EXPECT_EQ(target->query, std::get<Target>(alone).query);
+    }
+  }
+  EXPECT_EQ(refused_target(std::string_view("/%41").substr(0, 3)), 400);
+  EXPECT_EQ(refused_target(std::string_view("/?a=%41").substr(0, 6)), 400);
 }
 
 TEST(Target, KeepsEmptySegmentsAndEncodedSlashes) {
