@@ -141,6 +141,28 @@ TEST_F(AcquisitionTest, AViewWhoseAxisMovedMeanwhileIsTakenAgain) {
     EXPECT_EQ(set.load(i).at<unsigned char>(0, 0), 6 * i) << "view " << i;
 }
 
+TEST_F(AcquisitionTest, AViewWhoseAxisLostItsHomeOrStillMovedIsTakenAgain) {
+  using Disturb = void (*)(FakeAxisRecord&);
+  for (const Disturb disturb : {Disturb{[](FakeAxisRecord& axis) { axis.homed = false; }},
+                                Disturb{[](FakeAxisRecord& axis) { axis.moving = true; }}}) {
+    set(table_record_, &FakeAxisRecord::on_frame,
+        [disturb, before = table_record_.moves.size(), done = false](FakeAxisRecord& axis) mutable {
+          if (axis.moves.size() != before + 3 || done) return;
+          disturb(axis);
+          done = true;
+        });
+    const std::string object = "mug" + std::to_string(table_record_.moves.size());
+    const AcquisitionReport report = run(turn(object));
+    EXPECT_EQ(report.retaken, 1U);
+    EXPECT_EQ(report.taken, 6U);
+    const ImageSet views = ImageSet::open(folder_.path() / object);
+    ASSERT_EQ(views.views().size(), 6U);
+    for (std::size_t i = 0; i < views.views().size(); ++i)
+      EXPECT_EQ(views.load(i).at<unsigned char>(0, 0), 6 * i) << "view " << i;
+  }
+  EXPECT_EQ(table_record_.homings, 1);
+}
+
 TEST_F(AcquisitionTest, AnAxisThatNeverStaysEndsTheRunAfterAFewTries) {
   set(table_record_, &FakeAxisRecord::on_frame, [](FakeAxisRecord& axis) { axis.position += 30.0; });
   AcquisitionRequest request = turn("mug");
