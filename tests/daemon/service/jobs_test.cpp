@@ -217,5 +217,24 @@ TEST_F(JobsTest, RemembersTheLastHundred) {
   EXPECT_FALSE(jobs_.find("nonsense"));
 }
 
+TEST_F(JobsTest, ForgetsHoweverAJobHasEndedAndNeverOneThatRuns) {
+  const JobStatus running = jobs_.start(JobKind::acquire, "mug", [](const Jobs::Context& job) {
+    wait_for_stop(job.stop);
+    return JobResult();
+  });
+  for (int i = 0; i < 150; ++i) {
+    const JobStatus job = jobs_.start(JobKind::learn, "", [i](const Jobs::Context&) {
+      if (i % 3 == 1) throw Error("failed");
+      if (i % 3 == 2) throw Interrupted();
+      return JobResult();
+    });
+    ended(jobs_, job.id);
+  }
+  EXPECT_LE(jobs_.list().size(), 100U);
+  ASSERT_TRUE(jobs_.find(running.id).has_value());
+  EXPECT_EQ(jobs_.find(running.id)->state, JobState::running);
+  for (int id = 2; id < 50; ++id) EXPECT_FALSE(jobs_.find(std::to_string(id))) << id;
+}
+
 }  // namespace
 }  // namespace eigenpose::jobs_test

@@ -158,6 +158,26 @@ TEST_F(ServiceTest, StoppingMotionStopsTheAxisAndCancelsTheAcquisition) {
   EXPECT_EQ(axis_.moves.size(), 1U);
 }
 
+TEST_F(ServiceTest, WhatAnAcquisitionLeavesStandsAmongTheObjectsAsSoonAsItEnds) {
+  const auto acquired = [&](const std::string& name) {
+    for (const ObjectStatus& object : service().objects())
+      if (object.name == name) return object.acquired;
+    return std::optional<ObjectStatus::Acquired>();
+  };
+  EXPECT_EQ(ended(service().acquire("duck", "default")).state, JobState::done);
+  ASSERT_TRUE(acquired("duck").has_value());
+  EXPECT_EQ(acquired("duck")->views, 4U);
+  EXPECT_TRUE(acquired("duck")->complete);
+  {
+    const std::lock_guard lock(axis_.mutex);
+    axis_.lost_from_move = static_cast<int>(axis_.moves.size()) + 2;
+  }
+  EXPECT_EQ(ended(service().acquire("mug", "default")).state, JobState::failed);
+  ASSERT_TRUE(acquired("mug").has_value());
+  EXPECT_EQ(acquired("mug")->views, 2U);
+  EXPECT_FALSE(acquired("mug")->complete);
+}
+
 TEST_F(ServiceTest, LearnsTheCompleteSetsAndNamesThoseItLeavesOut) {
   write_set("one", 1);
   write_set("two", 2);
@@ -251,6 +271,21 @@ TEST(ModelStoreTest, ADamagedModelIsReportedAndLeftWhereItIs) {
   EXPECT_EQ(store.current(), nullptr);
   EXPECT_THAT(store.error().value_or(""), HasSubstr(file.string()));
   EXPECT_EQ(std::filesystem::file_size(file), 11U);
+}
+
+TEST(ModelStoreTest, TheTroubleWithAFormerFileEndsWithANewModel) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "model.h5";
+  std::ofstream(file) << "not a model";
+  ModelStore store(file);
+  store.load();
+  ASSERT_TRUE(store.error().has_value());
+  store.replace(testing::learned_world().model);
+  EXPECT_EQ(store.error(), std::nullopt);
+  ModelStore next(file);
+  next.load();
+  EXPECT_EQ(next.error(), std::nullopt);
+  EXPECT_NE(next.current(), nullptr);
 }
 
 /// A service of a camera alone, whose frames the test gives.
