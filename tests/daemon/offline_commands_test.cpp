@@ -314,6 +314,64 @@ TEST_F(OfflineCommands, EvaluateShowsScenesOfSeveralObjects) {
   EXPECT_THAT(unsaid.output, HasSubstr("--scenes 200"));
 }
 
+TEST_F(OfflineCommands, EvaluateFollowsItsSeedInEverythingThatIsDrawnAtRandom) {
+  write_objects();
+  for (const std::string drawn : {"--scenes 10", "--perturb rotation=8,shift=3", "--occlude 0.1"}) {
+    const auto report = [&](int seed) {
+      const Ended run = eigenpose("evaluate sets --learn-every 2 --size 32 --whole-region --json " + drawn +
+                                  " --seed " + std::to_string(seed) + " 2>/dev/null");
+      EXPECT_EQ(run.code, 0) << run.output;
+      json all = json::parse(run.output);
+      for (const char* measured : {"times_ms", "times_us_per_view"}) all.erase(measured);
+      return all;
+    };
+    const json first = report(1);
+    EXPECT_EQ(report(1), first) << drawn;
+    EXPECT_NE(report(2), first) << drawn;
+  }
+}
+
+TEST_F(OfflineCommands, LearnKeepsNoWindowsWhereWholeRegionsAreCompared) {
+  write_objects();
+  ASSERT_EQ(eigenpose("learn sets --to parts.model --size 32").code, 0);
+  ASSERT_EQ(eigenpose("learn sets --to whole.model --size 32 --whole-region").code, 0);
+  const auto content = [&](const std::string& name) {
+    std::ostringstream bytes;
+    bytes << std::ifstream(path(name), std::ios::binary).rdbuf();
+    return bytes.str();
+  };
+  // Names stand in an HDF5 file as they are: of the group of what only windows need.
+  EXPECT_NE(content("parts.model").find("voting"), std::string::npos);
+  EXPECT_EQ(content("whole.model").find("voting"), std::string::npos);
+}
+
+TEST_F(OfflineCommands, ImportLeavesOutAPictureThatCannotBeUsedUnlessStrict) {
+  std::filesystem::create_directories(path("shots"));
+  std::string table = "file,object,table_deg\n";
+  for (int i = 0; i < 4; ++i) {
+    const auto png = encode_png(testing::scene_with(1, 90.0 * i));
+    const std::string name = "shots/duck__" + std::to_string(i) + ".png";
+    std::ofstream(path(name), std::ios::binary)
+        .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+    table += name + ",duck," + std::to_string(90 * i) + "\n";
+  }
+  std::ofstream(path("poses.csv")) << table;
+  std::filesystem::resize_file(path("shots/duck__2.png"), 100);
+  for (const std::string source : {"table poses.csv", "coil shots --angle index:90"}) {
+    const Ended refused = eigenpose("import " + source + " --to strict --strict");
+    EXPECT_EQ(refused.code, 1) << source;
+    EXPECT_THAT(refused.output, HasSubstr("duck__2.png")) << source;
+    EXPECT_FALSE(std::filesystem::exists(path("strict/duck/set.json")) &&
+                 ImageSet::open(path("strict/duck")).complete())
+        << source;
+    std::filesystem::remove_all(path("strict"));
+    const Ended imported = eigenpose("import " + source + " --to sets");
+    EXPECT_EQ(imported.code, 0) << imported.output;
+    EXPECT_THAT(imported.output, AllOf(HasSubstr("duck__2.png"), HasSubstr("1 objects, 3 views"))) << source;
+    std::filesystem::remove_all(path("sets"));
+  }
+}
+
 TEST_F(OfflineCommands, SuggestTheCommandOrOptionThatWasMeant) {
   const auto refused = [&](const std::string& arguments) {
     const Ended run = eigenpose(arguments);
