@@ -171,6 +171,9 @@ TEST_F(HandControlTest, LampIsLitWithinItsRangeAndGoesDarkAtTheEnd) {
 
 /// A machine made of files.
 class CheckupTest : public testing::Test {
+ public:
+  ~CheckupTest() override { fs::remove_all(root_); }
+
  protected:
   // One folder a process: ctest runs several cases at a time.
   CheckupTest() : root_(fs::path(testing::TempDir()) / ("eigenpose-machine-" + std::to_string(::getpid()))) {
@@ -182,7 +185,6 @@ class CheckupTest : public testing::Test {
     config_.daemon.runtime_dir = root_ / "run";
     config_.daemon.state_dir = root_ / "state";
   }
-  ~CheckupTest() override { fs::remove_all(root_); }
 
   void put(const fs::path& file, const std::string& text) {
     fs::create_directories((root_ / file).parent_path());

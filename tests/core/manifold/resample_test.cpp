@@ -15,12 +15,14 @@ namespace eigenpose {
 namespace {
 
 class Resample : public ::testing::Test {
+ public:
+  ~Resample() override { std::filesystem::remove_all(folder_); }
+
  protected:
   Resample()
       : folder_(std::filesystem::temp_directory_path() / ("eigenpose-resample-" + std::to_string(getpid()))) {
     std::filesystem::create_directories(folder_);
   }
-  ~Resample() override { std::filesystem::remove_all(folder_); }
 
   std::mt19937 random_{21};
   Manifold surface_ = synthetic::smooth_manifold({synthetic::axis("table", 9, true, false, random_),

@@ -31,7 +31,7 @@ void wait_for_stop(const std::stop_token& stop) {
 /// Waits until the job has ended; the test's own timeout ends a job that never does.
 JobStatus ended(const Jobs& jobs, const std::string& id) {
   for (;;) {
-    const JobStatus job = jobs.find(id).value();
+    JobStatus job = jobs.find(id).value();
     if (job.state != JobState::running) return job;
     std::this_thread::yield();
   }
