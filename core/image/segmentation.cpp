@@ -11,9 +11,9 @@
 #include "core/simd/threshold.h"
 
 namespace eigenpose {
-namespace {
 
-using Word = std::uint64_t;
+/// What `Segmenter::Impl` is made of. Named: a class with external linkage has fields of these types.
+namespace segmentation {
 
 /// Foreground of one row, widened to the right and downwards by the bridged gap: [first, last) and its
 /// component.
@@ -32,6 +32,14 @@ struct Component {
   int bottom = 0;  ///< exclusive
   int area = 0;    ///< 0: nothing seen yet
 };
+
+}  // namespace segmentation
+
+namespace {
+
+using segmentation::Component;
+using segmentation::Run;
+using Word = std::uint64_t;
 
 int find_root(std::vector<Component>& components, int label) {
   while (components[static_cast<std::size_t>(label)].parent != label) {

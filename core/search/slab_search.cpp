@@ -11,16 +11,16 @@ namespace {
 /// Dimensions by which candidates are trimmed before they are measured; more cost more than they save.
 constexpr std::size_t trims = 6;
 
-struct Interval {
-  std::uint32_t first = 0;  ///< ranks [first, last)
-  std::uint32_t last = 0;
-  std::uint32_t dimension = 0;
-};
-
 }  // namespace
 
 /// The memory of one thread.
 struct SlabMemory {
+  struct Interval {
+    std::uint32_t first = 0;  ///< ranks [first, last)
+    std::uint32_t last = 0;
+    std::uint32_t dimension = 0;
+  };
+
   SampleMemory samples;
   std::vector<Interval> intervals;
   std::vector<std::uint32_t> candidates;
@@ -66,13 +66,13 @@ void SlabSearch::collect(const float* point, double radius, SlabMemory& memory) 
   const std::size_t used = std::min(trims, dims);
   std::partial_sort(memory.intervals.begin(), memory.intervals.begin() + static_cast<std::ptrdiff_t>(used),
                     memory.intervals.end(),
-                    [](const Interval& a, const Interval& b) { return a.last - a.first < b.last - b.first; });
-  const Interval& narrowest = memory.intervals[0];
+                    [](const auto& a, const auto& b) { return a.last - a.first < b.last - b.first; });
+  const SlabMemory::Interval& narrowest = memory.intervals[0];
   const auto backward = backward_.begin() + static_cast<std::ptrdiff_t>(narrowest.dimension * n);
   memory.candidates.assign(backward + narrowest.first, backward + narrowest.last);
   std::size_t count = memory.candidates.size();
   for (std::size_t t = 1; t < used; ++t) {
-    const Interval& interval = memory.intervals[t];
+    const SlabMemory::Interval& interval = memory.intervals[t];
     const std::uint32_t* forward = forward_.data() + interval.dimension * n;
     const std::uint32_t width = interval.last - interval.first;
     std::size_t kept = 0;
