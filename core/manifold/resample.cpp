@@ -1,11 +1,11 @@
 #include "core/manifold/resample.h"
 
 #include <array>
-#include <charconv>
 #include <stdexcept>
 #include <string>
 
 #include "core/base/atomic_file.h"
+#include "core/base/csv_text.h"
 
 namespace eigenpose {
 
@@ -47,44 +47,22 @@ ResampledManifold resample(const Manifold& manifold, std::span<const std::size_t
   return result;
 }
 
-namespace {
-
-void append(std::string& text, double value) {
-  std::array<char, 40> digits;
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::general, 9);
-  text.append(digits.data(), end.ptr);
-}
-
-/// A header field, in quotes where it holds a comma, a quote or a line end.
-std::string quoted(const std::string& field) {
-  if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
-  std::string result = "\"";
-  for (const char c : field) {
-    if (c == '"') result += '"';
-    result += c;
-  }
-  return result + '"';
-}
-
-}  // namespace
-
 void write_csv(const std::filesystem::path& file, const Manifold& manifold,
                const ResampledManifold& resampled) {
   std::string text;
   for (std::size_t a = 0; a < manifold.dofs(); ++a) {
     const Dof& dof = manifold.axes()[a].dof;
-    text += quoted(dof.name + " [" + dof.unit + "]") + ",";
+    text += csv_field(dof.name + " [" + dof.unit + "]") + ",";
   }
   for (Eigen::Index k = 0; k < resampled.points.rows(); ++k)
     text += "e" + std::to_string(k + 1) + (k + 1 < resampled.points.rows() ? "," : "\r\n");
   for (Eigen::Index i = 0; i < resampled.points.cols(); ++i) {
     for (Eigen::Index a = 0; a < resampled.q.rows(); ++a) {
-      append(text, resampled.q(a, i));
+      append_number(text, resampled.q(a, i));
       text += ',';
     }
     for (Eigen::Index k = 0; k < resampled.points.rows(); ++k) {
-      append(text, resampled.points(k, i));
+      append_number(text, resampled.points(k, i));
       text += k + 1 < resampled.points.rows() ? "," : "\r\n";
     }
   }
