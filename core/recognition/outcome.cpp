@@ -65,6 +65,8 @@ void HypothesisPool::clear(Outcome& outcome) {
   outcome.q_sigma.clear();
   outcome.q_covariance.clear();
   outcome.rejection_distance = 0.0;
+  outcome.evidence = 0.0;
+  outcome.required_evidence = 0.0;
   outcome.covered_share = 0.0;
   outcome.confidence = 0.0;
   outcome.unfinished = false;

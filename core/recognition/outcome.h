@@ -48,6 +48,10 @@ struct Outcome {
   /// Of `best->q`, m × m, row by row; its diagonal is q_sigma².
   std::vector<double> q_covariance;
   double rejection_distance = 0.0;  ///< of the best object; `best->distance` is compared with it
+  /// Log-odds (natural logarithm) that the region shows the best object rather than an unknown one.
+  double evidence = 0.0;
+  /// The region is unknown with less evidence than this: it holds the two rates that were set.
+  double required_evidence = 0.0;
   /// Share of the region that does not show the best object: something occludes it, or stands beside it. A
   /// partly occluded object is recognised by its windows, whatever its distance.
   double covered_share = 0.0;
