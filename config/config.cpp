@@ -219,6 +219,8 @@ LearnOptions read_learn(const TomlTable& table) {
   options.size = static_cast<int>(table.integer("size", options.size, 8, 256));
   options.color = table.flag("color", options.color);
   options.type = table.text("type", "");
+  options.false_rejection = table.number("false_rejection", options.false_rejection, 0.0, 0.5);
+  options.false_acceptance = table.number("false_acceptance", options.false_acceptance, 0.0, 1.0);
   table.finish();
   return options;
 }

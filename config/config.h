@@ -109,7 +109,9 @@ struct LearnOptions {
   std::optional<double> energy;  ///< if set, the smallest K that keeps this share, at most `components`
   int size = 64;                 ///< side of an appearance, pixels
   bool color = true;
-  std::string type;  ///< an image type or a sum of them; empty: brightness, in colour or grey
+  std::string type;                 ///< an image type or a sum of them; empty: brightness, in colour or grey
+  double false_rejection = 0.001;   ///< share of views of known objects that may be called unknown
+  double false_acceptance = 0.005;  ///< share of views of unknown objects that may get a name
 };
 
 /// [watch]

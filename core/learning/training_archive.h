@@ -42,8 +42,9 @@ class TrainingArchive {
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   /// The model was learned from these views: of the same objects, at the same time.
   [[nodiscard]] bool belong_to(const Model& model) const;
-  /// How they were learned: normalisation, solver with components and energy, degree, object spaces, parts
-  /// and the name of the image sets. Everything else is as a LearningOptions begins.
+  /// How they were learned: normalisation, solver with components and energy, degree, object spaces, parts,
+  /// the rates of false rejections (one for all thresholds) and false acceptances, and the name of the image
+  /// sets. Everything else is as a LearningOptions begins.
   [[nodiscard]] const LearningOptions& options() const { return options_; }
   [[nodiscard]] std::span<const ObjectViews> objects() const { return objects_; }
   /// The pictures of object o, view after view, and the energy of each view's appearance.

@@ -47,7 +47,6 @@ struct EvaluateOptions {
   unsigned seed = 1;
   bool leave_one_out = false;
   SceneOptions scenes;
-  double rejection_rate = 0.001;
   bool as_json = false;
 };
 
@@ -225,8 +224,6 @@ int run_evaluate(const EvaluateOptions& options, const std::stop_token& stop) {
         "--overlap says how the objects of --scenes stand; give their number too, as in --scenes 200");
   evaluation.scenes = options.scenes;
   evaluation.scenes.seed = options.seed;
-  evaluation.learning.calibration.rate = options.rejection_rate;
-  evaluation.learning.match.rate = options.rejection_rate;
   ConsoleProgress progress;
   const EvaluationReport report = evaluate(sets, evaluation, progress.callback(), stop);
   progress.clear();
@@ -272,11 +269,6 @@ void add_evaluate_command(CLI::App& app, CommandLine& line) {
           "Objects of a scene touch, and occlude up to this share of each other; without it they stand "
           "apart")
       ->check(CLI::Range(0.0, 0.9));
-  command
-      ->add_option("--rejection-rate", options->rejection_rate,
-                   "Share of known regions that may be called unknown (0…0.5)")
-      ->check(CLI::Range(0.0, 0.5))
-      ->capture_default_str();
   command->add_flag("--json", options->as_json, "Print the result as JSON");
   command->callback(
       [options, &line] { line.action = [options, &line] { return run_evaluate(*options, line.stop); }; });

@@ -95,12 +95,31 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       .add_option("--memory-limit", arguments.memory_limit_mib,
                   "MiB for views and solver; views that do not fit are kept on disk. 0 means no limit")
       ->check(CLI::Range(0.0, 1e9));
+  command
+      .add_option("--false-rejection", arguments.false_rejection,
+                  "Share of views of known objects that may be called unknown (0…0.5)")
+      ->check(CLI::Range(0.0, 0.5))
+      ->capture_default_str();
+  command
+      .add_option("--false-acceptance", arguments.false_acceptance,
+                  "Share of views of unknown objects that may get a name (0…1)")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   command.add_option("--objects", arguments.objects, "Only these objects, e.g. obj1,obj2")->delimiter(',');
 }
 
 std::vector<std::string> fixed_learning_options() {
-  return {"--components", "--energy", "--size",   "--color",       "--grey",
-          "--type",       "--solver", "--degree", "--whole-region"};
+  return {"--components",
+          "--energy",
+          "--size",
+          "--color",
+          "--grey",
+          "--type",
+          "--solver",
+          "--degree",
+          "--whole-region",
+          "--false-rejection",
+          "--false-acceptance"};
 }
 
 namespace {
@@ -182,6 +201,12 @@ std::string energy_text(double energy, double bound) {
   return text;
 }
 
+void set_rates(const LearningArguments& arguments, LearningOptions& options) {
+  options.match.rate = arguments.false_rejection;
+  options.calibration.rate = arguments.false_rejection;
+  options.match.false_acceptance_rate = arguments.false_acceptance;
+}
+
 std::size_t memory_limit(const LearningArguments& arguments) {
   return static_cast<std::size_t>(arguments.memory_limit_mib * 1024.0 * 1024.0);
 }
@@ -200,6 +225,7 @@ LearningOptions learning_options(const LearningArguments& arguments, std::span<c
   choose_type(arguments, sets, options.normalization);
   options.parts = !arguments.whole_region;
   options.memory_limit = memory_limit(arguments);
+  set_rates(arguments, options);
   options.image_sets = absolute_folder(folder);
   options.program_version = EIGENPOSE_VERSION;
   return options;

@@ -27,11 +27,12 @@ struct LearningArguments {
   double memory_limit_mib = 0.0;
   std::vector<std::string> objects;
   bool strict = false;
+  double false_rejection = LearningOptions{}.match.rate;                    ///< --false-rejection
+  double false_acceptance = LearningOptions{}.match.false_acceptance_rate;  ///< --false-acceptance
 };
 
 /// Adds --components, --energy, --size, --type, --color, --grey, --whole-region, --solver, --degree,
-/// --threads,
-/// --memory-limit and --objects.
+/// --threads, --memory-limit, --objects, --false-rejection and --false-acceptance.
 void add_learning_options(CLI::App& command, LearningArguments& arguments);
 
 /// Names of those among them that a model, once learned, is bound to.
@@ -51,6 +52,9 @@ std::string absolute_folder(const std::string& folder);
 
 /// "76.0 % of the scatter (within 0.7 %)"; without a bound that shows, the share alone.
 std::string energy_text(double energy, double bound);
+
+/// The two rates that the line sets, in the library's options.
+void set_rates(const LearningArguments& arguments, LearningOptions& options);
 
 /// --memory-limit in bytes.
 std::size_t memory_limit(const LearningArguments& arguments);

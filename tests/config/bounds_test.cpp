@@ -64,6 +64,8 @@ const std::vector<Bounds> floating_point_numbers = {
     {"[[lamp]]\nname = \"l\"\ndriver = \"dmx\"\nendpoint = \"usb:1\"\n", "level", "-0.001", "0.0", "1.0",
      "1.001"},
     {"[learn]\n", "energy", "0.009", "0.01", "1.0", "1.001"},
+    {"[learn]\n", "false_rejection", "-0.001", "0.0", "0.5", "0.501"},
+    {"[learn]\n", "false_acceptance", "-0.001", "0.0", "1.0", "1.001"},
     {"[watch]\n", "threshold", "0.499", "0.5", "255.0", "255.001"},
     {"[sim]\n", "speed_factor", "0.009", "0.01", "1000.0", "1000.001"},
 };

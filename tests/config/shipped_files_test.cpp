@@ -60,6 +60,8 @@ TEST(ShippedFiles, TheExplainedFileHasOnlyDefaultsInItsCommonSections) {
   EXPECT_EQ(shipped.learn.components, learn.components);
   EXPECT_EQ(shipped.learn.size, learn.size);
   EXPECT_EQ(shipped.learn.color, learn.color);
+  EXPECT_EQ(shipped.learn.false_rejection, learn.false_rejection);
+  EXPECT_EQ(shipped.learn.false_acceptance, learn.false_acceptance);
   EXPECT_EQ(shipped.watch.settle, watch.settle);
 }
 

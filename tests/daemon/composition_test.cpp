@@ -48,7 +48,8 @@ TEST(Composition, AnImageTypeThatIsNotKnownIsRefusedWithItsKey) {
 TEST(Composition, EveryKeyOfLearningAndWatchingReachesTheService) {
   const ServiceOptions options = service_options(parse_config(
       "[daemon]\nstate_dir = \"/s\"\n[learn]\ncomponents = 7\nenergy = 0.5\nsize = 32\ncolor = false\n"
-      "[watch]\nenabled = false\nsettle_ms = 123\nthreshold = 4.5\n",
+      "false_rejection = 0.02\nfalse_acceptance = 0.03\n[watch]\nenabled = false\nsettle_ms = 123\nthreshold "
+      "= 4.5\n",
       "rig.toml"));
   EXPECT_EQ(options.image_sets, "/s/sets");
   EXPECT_EQ(options.model_file, "/s/model.h5");
@@ -56,6 +57,9 @@ TEST(Composition, EveryKeyOfLearningAndWatchingReachesTheService) {
   EXPECT_EQ(options.learning.solver.energy, 0.5);
   EXPECT_EQ(options.learning.normalization.size, 32);
   EXPECT_FALSE(options.learning.normalization.color);
+  EXPECT_EQ(options.learning.match.rate, 0.02);
+  EXPECT_EQ(options.learning.calibration.rate, 0.02);
+  EXPECT_EQ(options.learning.match.false_acceptance_rate, 0.03);
   EXPECT_EQ(options.learning.image_sets, "/s/sets");
   EXPECT_FALSE(options.watch.enabled);
   EXPECT_EQ(options.watch.scene.settle, std::chrono::milliseconds(123));

@@ -101,6 +101,8 @@ TEST_F(TrainingArchiveTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
   set_image_type(gradient.normalization, "gradient");
   LearningOptions parts = testing::small_learning();
   parts.parts = true;
+  parts.match.rate = parts.calibration.rate = 0.1;
+  parts.match.false_acceptance_rate = 0.25;
   LearningOptions krylov = testing::small_learning();
   krylov.solver.solver = "krylov";
   krylov.solver.components = 3;
@@ -111,6 +113,10 @@ TEST_F(TrainingArchiveTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
     write("two", 2);
     keep("kept", options);
     EXPECT_EQ(TrainingArchive(path("kept")).products().size() > 0, options.solver.solver != "krylov");
+    const LearningOptions kept = TrainingArchive(path("kept")).options();
+    EXPECT_EQ(kept.match.rate, options.match.rate);
+    EXPECT_EQ(kept.calibration.rate, options.calibration.rate);
+    EXPECT_EQ(kept.match.false_acceptance_rate, options.match.false_acceptance_rate);
     std::filesystem::remove_all(sets());
     write("three", 3);
     const auto changed = updated("kept", {"one"}, open_image_sets(sets()));
