@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <mutex>
 #include <numeric>
@@ -20,13 +21,6 @@ namespace {
 
 constexpr double gross_error = 45.0;
 
-/// What came of it.
-struct Answer {
-  std::string said;  ///< empty: nothing found
-  Verdict verdict = Verdict::unknown;
-  double pose_error = 0.0;
-};
-
 /// One worker's recogniser and what it spent.
 struct Worker {
   Worker(const std::shared_ptr<const Model>& model, const RecognizerOptions& options)
@@ -44,44 +38,54 @@ void add(RecognitionTimes& sum, const RecognitionTimes& part) {
   sum.total += part.total;
 }
 
-Answer recognize_one(Worker& worker, const ImageSet& set, std::size_t view, const TestDamage& damage,
-                     std::size_t index) {
+/// What the stages of an evaluation share.
+struct Task {
+  std::span<const ImageSet> sets;
+  std::span<const SetView> tests;
+  const EvaluationOptions& options;
+  const Progress& progress;
+  std::stop_token stop;
+};
+
+/// Sets what was said of the shown view, and the errors of its pose.
+void record_outcome(const Outcome& outcome, std::span<const ImageSet> sets, RegionRecord& record) {
+  record.verdict = outcome.verdict;
+  record.evidence = outcome.evidence;
+  record.required_evidence = outcome.required_evidence;
+  record.confidence = outcome.confidence;
+  if (!outcome.best) return;
+  const auto said = std::ranges::find(sets, outcome.best->object, &ImageSet::object);
+  record.said = static_cast<std::size_t>(said - sets.begin());
+  record.said_q = outcome.best->q;
+  if (!record.best_is_right()) return;
+  const Dof& dof = sets[record.object].workspace()[0];
+  const auto error = [&](const std::vector<double>& q) {
+    return std::abs(dof.difference(q.front(), record.true_q.front()));
+  };
+  record.pose_error = error(outcome.best->q);
+  if (outcome.other_pose) record.other_pose_error = error(outcome.other_pose->q);
+}
+
+/// Shows test number `index`.
+RegionRecord recognize_one(Worker& worker, const Task& task, std::size_t index, bool known) {
+  const SetView& test = task.tests[index];
+  const ImageSet& set = task.sets[test.set];
   const TimePoint began = std::chrono::steady_clock::now();
-  cv::Mat image = set.load(view);
-  if (damage.any()) image = damaged(image, damage, index);
+  cv::Mat image = set.load(test.view);
+  if (task.options.damage.any()) image = damaged(image, task.options.damage, index);
   worker.load_time += std::chrono::steady_clock::now() - began;
   RecognitionTimes times;
   const auto outcomes = worker.recognizer.recognize(image, &times);
   add(worker.spent, times);
+  RegionRecord record;
+  record.object = test.set;
+  record.known = known;
+  record.view = test.view;
+  record.true_q = set.views()[test.view].q;
   const auto largest =
-      std::max_element(outcomes.begin(), outcomes.end(),
-                       [](const Outcome& a, const Outcome& b) { return a.box.area() < b.box.area(); });
-  if (largest == outcomes.end() || !largest->best) return {};
-  Answer answer{largest->best->object, largest->verdict, 0.0};
-  if (answer.said == set.object())
-    answer.pose_error =
-        std::abs(set.workspace()[0].difference(largest->best->q.front(), set.views()[view].q.front()));
-  return answer;
-}
-
-void count(EvaluationReport& report, ObjectEvaluation& object, const Answer& answer) {
-  ++object.test_views;
-  ++report.test_views;
-  if (answer.said != object.object) {
-    if (answer.said.empty()) ++object.missed;
-    ++report.confusions[{object.object, answer.said.empty() ? "(nothing)" : answer.said}];
-    return;
-  }
-  ++object.right;
-  ++report.right;
-  object.pose_errors.push_back(answer.pose_error);
-  if (answer.verdict == Verdict::ambiguous) {
-    ++object.ambiguous;
-    ++report.ambiguous;
-  } else if (answer.verdict != Verdict::recognized) {
-    ++object.rejected;
-    ++report.rejected;
-  }
+      std::ranges::max_element(outcomes, {}, [](const Outcome& outcome) { return outcome.box.area(); });
+  if (largest != outcomes.end()) record_outcome(*largest, task.sets, record);
+  return record;
 }
 
 /// The model without one of its objects, whose views have no part in the thresholds either.
@@ -110,33 +114,21 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
   return rest;
 }
 
-/// What the stages of an evaluation share.
-struct Task {
-  std::span<const ImageSet> sets;
-  std::span<const SetView> tests;
-  const EvaluationOptions& options;
-  const Progress& progress;
-  std::stop_token stop;
-};
-
 /// Shows every test view to the model with all objects.
 void show_known(const std::shared_ptr<const Model>& model, const Task& task, EvaluationReport& report) {
   const EvaluationOptions& options = task.options;
   const unsigned threads = resolved_threads(options.threads);
   std::vector<Worker> workers;
   for (unsigned t = 0; t < threads; ++t) workers.emplace_back(model, options.recognizer);
-  std::vector<Answer> answers(task.tests.size());
+  report.records.resize(task.tests.size());
   WorkMeter meter(task.progress, task.stop, "recognising", task.tests.size());
   parallel_for(threads, threads, [&](std::size_t t) {
     for (std::size_t i = t; i < task.tests.size(); i += threads) {
       meter.check_stop();
-      const SetView& test = task.tests[i];
-      answers[i] = recognize_one(workers[t], task.sets[test.set], test.view, options.damage, i);
+      report.records[i] = recognize_one(workers[t], task, i, true);
       meter.finished(1);
     }
   });
-  for (std::size_t i = 0; i < answers.size(); ++i)
-    count(report, report.objects[task.tests[i].set], answers[i]);
   for (const Worker& worker : workers) {
     add(report.times, worker.spent);
     report.load_time += worker.load_time;
@@ -148,22 +140,28 @@ void show_unknown(const Model& model, const Task& task, EvaluationReport& report
   const EvaluationOptions& options = task.options;
   if (task.sets.size() < 2)
     throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
-  std::vector<std::size_t> accepted(task.sets.size(), 0);
-  std::vector<std::size_t> shown(task.sets.size(), 0);
+  std::vector<RegionRecord> records(task.tests.size());
   WorkMeter meter(task.progress, task.stop, "showing unknown objects", task.sets.size());
   parallel_for(task.sets.size(), options.threads, [&](std::size_t s) {
     Worker worker(without_object(model, s, report.learning, options.learning.match), options.recognizer);
     for (std::size_t i = 0; i < task.tests.size(); ++i) {
       if (task.tests[i].set != s) continue;
       meter.check_stop();
-      const Answer answer = recognize_one(worker, task.sets[s], task.tests[i].view, options.damage, i);
-      ++shown[s];
-      if (answer.verdict == Verdict::recognized || answer.verdict == Verdict::ambiguous) ++accepted[s];
+      records[i] = recognize_one(worker, task, i, false);
     }
     meter.finished(1);
   });
-  report.strangers = std::accumulate(shown.begin(), shown.end(), std::size_t{0});
-  report.false_accepts = std::accumulate(accepted.begin(), accepted.end(), std::size_t{0});
+  std::ranges::move(records, std::back_inserter(report.records));
+}
+
+/// Counts the records, of all objects and of each.
+void count_records(EvaluationReport& report) {
+  report.counts = count_answers(report.records);
+  for (const RegionRecord& record : report.records) {
+    ObjectEvaluation& object = report.objects[record.object];
+    object.counts.add(record);
+    if (record.pose_error) object.pose_errors.push_back(*record.pose_error);
+  }
 }
 
 /// Shows scenes composed of test views.
@@ -235,8 +233,10 @@ EvaluationReport::PoseErrors summarize_errors(std::vector<double> errors) {
   return result;
 }
 
-double EvaluationReport::recognition_rate() const {
-  return test_views == 0 ? 0.0 : static_cast<double>(right) / static_cast<double>(test_views);
+std::vector<std::string> EvaluationReport::object_names() const {
+  std::vector<std::string> names;
+  for (const ObjectEvaluation& object : objects) names.push_back(object.object);
+  return names;
 }
 
 EvaluationReport::PoseErrors EvaluationReport::pose_errors() const {
@@ -275,6 +275,7 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
   for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->memory(o);
   report.model_bytes /= model->objects.size();
   if (options.leave_one_out) show_unknown(*model, task, report);
+  count_records(report);
   if (options.scenes.count > 0) report.scenes = show_scenes(model, task);
   return report;
 }

@@ -3,16 +3,15 @@
 /// Measuring recognition: learn some views, show the others, count.
 
 #include <cstddef>
-#include <map>
 #include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/dataset/image_set.h"
 #include "core/evaluation/composed_scenes.h"
+#include "core/evaluation/region_record.h"
 #include "core/learning/learning.h"
 #include "core/recognition/recognizer.h"
 
@@ -41,9 +40,9 @@ struct EvaluationOptions {
   LearningOptions learning;
   RecognizerOptions recognizer;
   TestDamage damage;
-  /// Also show the test views of every object to a model that does not hold it: an unknown object. The
-  /// object is taken out of the learned model, and its views out of what thresholds are set from; eigenspaces
-  /// stay as learned with all.
+  /// Also show the test views of every object, damaged as the others are, to a model that does not hold it:
+  /// an unknown object. The object is taken out of the learned model, and its views out of what thresholds
+  /// are set from; eigenspaces stay as learned with all.
   bool leave_one_out = false;
   /// Also show scenes composed of test views.
   SceneOptions scenes;
@@ -54,36 +53,30 @@ struct EvaluationOptions {
 struct ObjectEvaluation {
   std::string object;
   std::size_t learned_views = 0;
-  std::size_t test_views = 0;
-  std::size_t right = 0;      ///< the nearest object is the true one
-  std::size_t rejected = 0;   ///< nearest is the true one, yet beyond its rejection distance
-  std::size_t ambiguous = 0;  ///< nearest is the true one, and another fits about as well
-  std::size_t missed = 0;     ///< no region was found
   bool pose_observable = true;
-  std::vector<double> pose_errors;  ///< |error| of the first DOF in its unit, of the right ones
+  AnswerCounts counts;
+  std::vector<double> pose_errors;  ///< |error| of the first DOF in its unit, where the best object is right
 };
 
 struct EvaluationReport {
   std::vector<ObjectEvaluation> objects;
-  /// (true object, what was said) → views. Only what was wrong.
-  std::map<std::pair<std::string, std::string>, std::size_t> confusions;
+  /// One for each test view, object after object; then, with `leave_one_out`, the same views again as unknown
+  /// objects. Indices of objects are those of `objects`.
+  std::vector<RegionRecord> records;
+  AnswerCounts counts;  ///< of all records
   LearningReport learning;
-  RecognitionTimes times;  ///< summed over test views, of all threads
-  Duration load_time{};    ///< reading and decoding test views, summed
-  std::size_t test_views = 0;
-  std::size_t right = 0;
-  std::size_t rejected = 0;
-  std::size_t ambiguous = 0;
-  std::size_t strangers = 0;      ///< views shown to models without their object
-  std::size_t false_accepts = 0;  ///< of these, taken for another object
+  RecognitionTimes times;  ///< summed over known test views, of all threads
+  Duration load_time{};    ///< reading and decoding them, summed
   std::optional<SceneReport> scenes;
   double smallest_rate = 1.0;   ///< of wrong rejections, that the learned views can support
   std::size_t model_bytes = 0;  ///< Model::memory, mean of an object
 
-  /// 0…1
-  [[nodiscard]] double recognition_rate() const;
-  /// Mean, median, 90th percentile, and the share above 45 (degrees, where the DOF is an angle), over right
-  /// views.
+  /// Share of known test views whose best object is the true one, whatever the verdict; 0…1.
+  [[nodiscard]] double recognition_rate() const { return counts.recognition_rate(); }
+  /// In the order of `objects`.
+  [[nodiscard]] std::vector<std::string> object_names() const;
+  /// Mean, median, 90th percentile, and the share above 45 (degrees, where the DOF is an angle), over views
+  /// whose best object is right.
   struct PoseErrors {
     double mean = 0.0;
     double median = 0.0;
@@ -93,7 +86,7 @@ struct EvaluationReport {
   [[nodiscard]] PoseErrors pose_errors() const;
 };
 
-/// Learns and tests. Recognition is the nearest object, whether rejected or not.
+/// Learns and tests.
 /// @throws what `learn` throws; std::invalid_argument for options out of range or when nothing is left to
 /// test.
 EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOptions& options,
