@@ -38,9 +38,7 @@ LearningOptions learning_options(const Config& config) {
   }
   options.solver.components = static_cast<std::size_t>(config.learn.components);
   options.solver.energy = config.learn.energy;
-  options.match.rate = config.learn.false_rejection;
-  options.calibration.rate = config.learn.false_rejection;
-  options.match.false_acceptance_rate = config.learn.false_acceptance;
+  options.rates = {config.learn.false_rejection, config.learn.false_acceptance};
   options.image_sets = config.image_sets().string();
   options.program_version = EIGENPOSE_VERSION;
   return options;

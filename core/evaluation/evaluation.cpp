@@ -14,6 +14,7 @@
 #include "core/base/statistics.h"
 #include "core/base/work_meter.h"
 #include "core/image/occlusion.h"
+#include "core/learning/calibration/decision_calibration.h"
 #include "core/learning/calibration/perturbation.h"
 
 namespace eigenpose {
@@ -88,26 +89,19 @@ RegionRecord recognize_one(Worker& worker, const Task& task, std::size_t index, 
   return record;
 }
 
-/// The model without one of its objects, whose views have no part in the thresholds either.
+/// The model without one of its objects, whose views have no part in the decision either.
 std::shared_ptr<const Model> without_object(const Model& model, std::size_t object,
-                                            const LearningReport& learning,
-                                            const MatchCalibrationOptions& options) {
+                                            const LearningReport& learning) {
   auto rest = std::make_shared<Model>(model);
   const auto at = static_cast<std::ptrdiff_t>(object);
+  rest->decision = calibrate_decision(learning.probes, model.decision.set, object);
   rest->objects.erase(rest->objects.begin() + at);
   if (model.parts) {
     auto parts = std::make_shared<PartsModel>(*model.parts);
-    const MatchThresholds thresholds = match_thresholds(learning.match, options, object);
-    parts->sure_ratio = thresholds.sure_ratio;
-    parts->covered_evidence = occlusion_threshold(learning.covered, options.false_acceptance_rate, object);
-    for (std::size_t o = 0; o < learning.match.size(); ++o) {
-      PartsCalibration& own = parts->calibration[o];
-      own.rejection_distance = thresholds.rejection_distance[o];
-      own.sure_distance = thresholds.sure_distance[o];
-    }
     parts->objects.erase(parts->objects.begin() + at);
     parts->poses.erase(parts->poses.begin() + at);
     parts->calibration.erase(parts->calibration.begin() + at);
+    parts->view_poses.erase(parts->view_poses.begin() + at);
     if (!parts->extents.empty()) parts->extents.erase(parts->extents.begin() + at);
     rest->parts = std::move(parts);
   }
@@ -143,7 +137,7 @@ void show_unknown(const Model& model, const Task& task, EvaluationReport& report
   std::vector<RegionRecord> records(task.tests.size());
   WorkMeter meter(task.progress, task.stop, "showing unknown objects", task.sets.size());
   parallel_for(task.sets.size(), options.threads, [&](std::size_t s) {
-    Worker worker(without_object(model, s, report.learning, options.learning.match), options.recognizer);
+    Worker worker(without_object(model, s, report.learning), options.recognizer);
     for (std::size_t i = 0; i < task.tests.size(); ++i) {
       if (task.tests[i].set != s) continue;
       meter.check_stop();
@@ -271,7 +265,7 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
 
   const Task task{sets, tests, options, progress, std::move(stop)};
   show_known(model, task, report);
-  if (model->parts) report.smallest_rate = model->parts->smallest_rate;
+  report.smallest_rate = model->decision.smallest_rate();
   for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->memory(o);
   report.model_bytes /= model->objects.size();
   if (options.leave_one_out) show_unknown(*model, task, report);

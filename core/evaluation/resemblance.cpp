@@ -88,7 +88,7 @@ std::vector<Resemblance> alike_poses(const Model& model, unsigned threads) {
     for (std::size_t s = 0; s < table.samples(); ++s) {
       const std::vector<double> q = table.pose(s);
       const auto other = table.other_minimum(table.point(s), q, poses_apart, other_q);
-      if (!other || other->distance > model.typical_distance(o)) continue;
+      if (!other || other->distance > model.objects[o].typical_distance) continue;
       if (worst.share == 0.0 || other->distance < worst.distance) {
         worst.distance = other->distance;
         worst.first_q = q;

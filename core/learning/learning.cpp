@@ -8,7 +8,10 @@
 #include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/base/utc_text.h"
+#include "core/learning/calibration/decision_calibration.h"
+#include "core/learning/calibration/yardsticks.h"
 #include "core/learning/object_eigenspaces.h"
+#include "core/learning/parts_learning.h"
 #include "core/learning/training_archive.h"
 
 namespace eigenpose {
@@ -67,9 +70,6 @@ LearningOptions settled_options(std::span<const TrainingSet> sets, LearningOptio
       !sets.empty() &&
       std::all_of(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.cropped(); });
   options.solver.threads = options.threads;
-  options.rejection.threads = options.threads;
-  options.calibration.threads = options.threads;
-  options.match.threads = options.threads;
   // Windows and alignment look at brightness.
   options.parts = options.parts && !is_range(options.normalization);
   // An alignment eigenspace is an object's own already.
@@ -115,14 +115,12 @@ std::vector<Manifold> fit_manifolds(const TrainingViews& views, const Eigen::Mat
 
 /// @param spaces one an object, or none.
 std::vector<ModelObject> model_objects(const TrainingViews& views, std::vector<Manifold> manifolds,
-                                       std::span<const RejectionEvidence> evidence,
+                                       std::span<const PoseEvidence> evidence,
                                        std::vector<ObjectEigenspace> spaces) {
   std::vector<ModelObject> objects;
   for (std::size_t o = 0; o < manifolds.size(); ++o) {
     const ObjectViews& object = views.objects()[o];
     ModelObject learned{object.object, object.workspace, std::move(manifolds[o])};
-    learned.rejection_distance = evidence[o].rejection_distance;
-    learned.typical_distance = evidence[o].typical_distance;
     learned.dof_observable = evidence[o].dof_observable;
     learned.pose_observable = evidence[o].dof_observable.front();
     learned.views = object.count;
@@ -132,35 +130,47 @@ std::vector<ModelObject> model_objects(const TrainingViews& views, std::vector<M
   return objects;
 }
 
-/// Thresholds of the aligned whole region, from the moved views. @param model with `parts`.
-void calibrate_match(const Run& run, const Model& model, const TrainingViews& views,
-                     const Eigen::MatrixXd& points, PartsModel& parts) {
-  run.report.match = measure_match(model, views, points, run.options.match, run.progress, run.stop);
-  const MatchThresholds match = match_thresholds(run.report.match, run.options.match);
-  parts.sure_ratio = match.sure_ratio;
-  parts.smallest_rate = match.smallest_rate;
-  for (std::size_t o = 0; o < run.report.match.size(); ++o) {
-    parts.calibration[o].rejection_distance = match.rejection_distance[o];
-    parts.calibration[o].sure_distance = match.sure_distance[o];
-    parts.calibration[o].typical_distance = run.report.match[o].typical_distance;
-  }
-}
-
-/// Windows and alignment eigenspaces with their thresholds, into model.parts.
-void learn_parts_model(const Run& run, const TrainingViews& views, const Eigen::MatrixXd& points,
-                       Model& model) {
-  const std::vector<PartsViews> pictures = parts_views(views);
+/// Windows and alignment eigenspaces.
+std::shared_ptr<PartsModel> learn_parts_model(const Run& run, const TrainingViews& views) {
   PartsLearningOptions learning;
   learning.threads = run.options.threads;
-  const auto parts = std::make_shared<PartsModel>(learn_parts(pictures, learning, run.progress, run.stop));
+  auto parts =
+      std::make_shared<PartsModel>(learn_parts(parts_views(views), learning, run.progress, run.stop));
   for (const ObjectViews& object : views.objects()) parts->extents.push_back(object.extents);
-  calibrate_parts(*parts, pictures, run.options.calibration, run.progress, run.stop);
-  model.parts = parts;
-  calibrate_match(run, model, views, points, *parts);
-  OcclusionCalibrationOptions occlusion;
-  occlusion.threads = run.options.threads;
-  run.report.covered = measure_occlusion(*parts, pictures, occlusion, run.progress, run.stop);
-  parts->covered_evidence = occlusion_threshold(run.report.covered, run.options.match.false_acceptance_rate);
+  return parts;
+}
+
+/// The yardsticks of the objects, and the decision, from the learned views shown as new and as unknown.
+/// @param parts those of the model, where it has any.
+void calibrate(const Run& run, const TrainingViews& views, const Eigen::MatrixXd& points,
+               const std::shared_ptr<PartsModel>& parts, Model& model) {
+  YardstickOptions yardstick;
+  ProbeOptions probe;
+  yardstick.threads = probe.threads = run.options.threads;
+  // Without alignment, misalignment adds to every distance: what segmentation causes on average.
+  if (!parts) yardstick.perturbation = probe.perturbation = {.shift = 0.015, .scale = 0.03, .turn_deg = 1.5};
+  const Yardsticks yardsticks = measure_yardsticks(model, views, points, yardstick, run.progress, run.stop);
+  for (std::size_t o = 0; o < model.objects.size(); ++o)
+    model.objects[o].typical_distance = yardsticks.typical_distance[o];
+  if (parts) parts->calibration = yardsticks.windows;
+  model.decision.weights = prior_weights();
+  run.report.probes = show_views(model, views, yardsticks, probe, run.progress, run.stop);
+  model.decision = calibrate_decision(run.report.probes, run.options.rates);
+}
+
+/// Whether the left-out views of each object show their poses.
+std::vector<PoseEvidence> measure_poses(const Run& run, const TrainingViews& views,
+                                        const Eigen::MatrixXd& points, std::span<const Manifold> manifolds) {
+  std::vector<PoseEvidence> evidence(manifolds.size());
+  parallel_for(manifolds.size(), run.options.threads, [&](std::size_t o) {
+    if (run.stop.stop_requested()) throw Interrupted();
+    const ObjectViews& object = views.objects()[o];
+    evidence[o] = measure_observability(
+        object,
+        points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count)),
+        manifolds[o].degree());
+  });
+  return evidence;
 }
 
 }  // namespace
@@ -217,9 +227,8 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   std::vector<Manifold> manifolds = fit_manifolds(views, points, options.spline_degree);
   result.manifold_time = watch.lap();
 
-  result.evidence =
-      measure_rejection({views, model.eigenspace, points, manifolds}, options.rejection, progress, stop);
-  result.rejection_time = watch.lap();
+  result.evidence = measure_poses(run, views, points, manifolds);
+  result.observability_time = watch.lap();
 
   std::vector<ObjectEigenspace> spaces;
   if (options.object_spaces)
@@ -228,8 +237,13 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   result.object_eigenspace_time = watch.lap();
 
   model.objects = model_objects(views, std::move(manifolds), result.evidence, std::move(spaces));
-  if (options.parts) learn_parts_model(run, views, points, model);
+  std::shared_ptr<PartsModel> parts;
+  if (options.parts) parts = learn_parts_model(run, views);
+  model.parts = parts;
   result.parts_time = watch.lap();
+
+  calibrate(run, views, points, parts, model);
+  result.calibration_time = watch.lap();
 
   model.provenance = {options.program_version, created,
                       options.image_sets,      result.solver.solver,

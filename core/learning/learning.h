@@ -9,10 +9,8 @@
 
 #include "core/base/atomic_file.h"
 #include "core/base/progress.h"
-#include "core/learning/calibration/distance_calibration.h"
-#include "core/learning/calibration/match_calibration.h"
-#include "core/learning/calibration/occlusion_calibration.h"
-#include "core/learning/calibration/parts_calibration.h"
+#include "core/learning/calibration/observability.h"
+#include "core/learning/calibration/probes.h"
 #include "core/learning/training_views.h"
 #include "core/model/model.h"
 #include "core/subspace/solver.h"
@@ -23,7 +21,6 @@ struct LearningOptions {
   NormalizationOptions normalization;
   SolverOptions solver;
   int spline_degree = 2;  ///< 1, 2 or 3
-  RejectionOptions rejection;
   /// What is done about views that cannot be used: `leave_out` names them in the report and learns the rest.
   BadViews bad_views = BadViews::leave_out;
   /// Without parts, learn each object's own eigenspace too: for a second look where two objects are close,
@@ -33,9 +30,8 @@ struct LearningOptions {
   /// only the whole region is matched. They use brightness whatever the image type is; of range there are
   /// none.
   bool parts = true;
-  MatchCalibrationOptions match;        ///< thresholds of the whole region, with parts
-  PartsCalibrationOptions calibration;  ///< thresholds of windows
-  unsigned threads = 0;                 ///< 0: all cores. The model does not depend on it.
+  DecisionRates rates;   ///< that the thresholds hold
+  unsigned threads = 0;  ///< 0: all cores. The model does not depend on it.
   /// Memory for views and solver, bytes; 0 means no limit. Views that do not fit are kept on disk and read in
   /// tiles. Beside it stand the model itself (windows and own spaces grow with the views) and a few pictures
   /// a thread.
@@ -53,15 +49,15 @@ struct LearningReport {
   std::size_t views = 0;
   std::vector<LeftOut> left_out;  ///< views and objects that could not be used, in the order of the sets
   SolverReport solver;
-  std::vector<RejectionEvidence> evidence;  ///< in the order of the model's objects
-  std::vector<MatchEvidence> match;         ///< the same of the aligned match; empty without parts
-  std::vector<OcclusionEvidence> covered;   ///< learned views shown as unknown objects; empty without parts
+  std::vector<PoseEvidence> evidence;  ///< in the order of the model's objects
+  std::vector<Probe> probes;           ///< learned views shown as new and as unknown
   Duration normalize_time{};
   Duration eigenspace_time{};
   Duration manifold_time{};
-  Duration rejection_time{};
+  Duration observability_time{};
   Duration object_eigenspace_time{};
-  Duration parts_time{};  ///< windows, alignment eigenspaces and their calibration
+  Duration parts_time{};        ///< windows and alignment eigenspaces
+  Duration calibration_time{};  ///< yardsticks, probes and decision
   Duration total_time{};
   /// The kept views, written and verified. Commit them when the model is saved: then neither a full disk nor
   /// a crash leaves a model with the views of another. Learning without a report commits them itself. Null

@@ -57,8 +57,8 @@ Eigen::MatrixXd project(const Eigenspace& space, const Eigen::MatrixXf& columns)
 }  // namespace
 
 std::vector<ObjectEigenspace> learn_object_eigenspaces(const TrainingViews& views,
-                                                       std::span<const RejectionEvidence> evidence,
-                                                       int degree, unsigned threads, const Progress& progress,
+                                                       std::span<const PoseEvidence> evidence, int degree,
+                                                       unsigned threads, const Progress& progress,
                                                        std::stop_token stop) {
   const auto objects = views.objects();
   std::vector<std::optional<ObjectEigenspace>> spaces(objects.size());

@@ -196,7 +196,7 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   const std::size_t count = objects.size();
   model.objects.resize(count);
   model.poses.resize(count);
-  model.calibration.resize(count);
+  model.calibration.resize(count);  // yardsticks come from core/learning/calibration
   model.view_poses.resize(count);
 
   Grids grids = compute_grids(objects, options, stop, model);

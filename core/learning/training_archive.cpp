@@ -27,8 +27,8 @@ void write_options(const Hdf5Group& group, const LearningOptions& options) {
   group.write("spline_degree", std::int64_t{options.spline_degree});
   group.write("object_spaces", std::int64_t{options.object_spaces});
   group.write("parts", std::int64_t{options.parts});
-  group.write("false_rejection", options.match.rate);
-  group.write("false_acceptance", options.match.false_acceptance_rate);
+  group.write("false_rejection", options.rates.false_rejection);
+  group.write("false_acceptance", options.rates.false_acceptance);
   group.write("image_sets", options.image_sets);
   write_normalization(group.make_group("normalization"), options.normalization);
 }
@@ -42,8 +42,8 @@ LearningOptions read_options(const Hdf5Group& group) {
   options.object_spaces = group.read_bool("object_spaces");
   options.parts = group.read_bool("parts");
   if (group.has_attribute("false_rejection")) {  // else written before there were options for them
-    options.match.rate = options.calibration.rate = group.read_double("false_rejection");
-    options.match.false_acceptance_rate = group.read_double("false_acceptance");
+    options.rates.false_rejection = group.read_double("false_rejection");
+    options.rates.false_acceptance = group.read_double("false_acceptance");
   }
   options.image_sets = group.read_text("image_sets");
   options.normalization = read_normalization(group.open_group("normalization"));

@@ -12,6 +12,7 @@
 #include "core/base/workspace.h"
 #include "core/image/normalization.h"
 #include "core/manifold/manifold.h"
+#include "core/model/decision_model.h"
 #include "core/model/object_eigenspace.h"
 #include "core/model/parts_model.h"
 #include "core/subspace/eigenspace.h"
@@ -22,10 +23,9 @@ namespace eigenpose {
 struct ModelObject {
   std::string name;
   Workspace workspace;
-  Manifold manifold;                ///< in the universal eigenspace
-  double rejection_distance = 0.0;  ///< without alignment: a region farther than this is unknown
-  /// Root mean square distance of views known to show this object, slightly moved and scaled: the yardstick
-  /// for "about as well".
+  Manifold manifold;  ///< in the universal eigenspace
+  /// Root mean square distance of new views of this object from its manifold, after alignment where the model
+  /// aligns.
   double typical_distance = 0.0;
   /// For each DOF: views left out of learning are found again at about their true value.
   std::vector<bool> dof_observable = {};
@@ -54,16 +54,12 @@ struct Model {
   std::vector<ModelObject> objects;
   /// Windows and pose spaces, in the order of `objects`; null where only the whole region is matched.
   std::shared_ptr<const PartsModel> parts;
+  DecisionModel decision;
   Provenance provenance;
 
-  /// Beyond this distance a region that is nearest to object `o` is unknown: after alignment, where the model
-  /// knows windows.
+  /// A whole region farther from object `o` is unknown, unless its windows say more.
   [[nodiscard]] double rejection_distance(std::size_t o) const {
-    return parts ? parts->calibration[o].rejection_distance : objects[o].rejection_distance;
-  }
-  /// Root mean square distance of new views of object `o` from its manifold, likewise.
-  [[nodiscard]] double typical_distance(std::size_t o) const {
-    return parts ? parts->calibration[o].typical_distance : objects[o].typical_distance;
+    return decision.distance_of(decision.required, objects[o].typical_distance);
   }
   /// Bytes held for object `o` alone: windows, pose space, own eigenspace.
   [[nodiscard]] std::size_t memory(std::size_t o) const {

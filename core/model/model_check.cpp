@@ -1,5 +1,6 @@
 #include "core/model/model_check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -66,7 +67,6 @@ void check_manifold(const std::string& of, const Manifold& manifold, Eigen::Inde
 void check_object(const Model& model, const ModelObject& object) {
   const std::string of = "object \"" + object.name + "\": ";
   check_manifold(of, object.manifold, model.eigenspace.components());
-  check_not_negative(of + "the rejection distance", object.rejection_distance);
   check_not_negative(of + "the typical distance", object.typical_distance);
   if (object.workspace.size() != object.manifold.dofs() ||
       object.dof_observable.size() != object.workspace.size())
@@ -97,12 +97,8 @@ void check_windows(const std::string& of, const PartsObject& object, std::size_t
 }
 
 void check_calibration(const std::string& of, const PartsCalibration& calibration) {
-  check_not_negative(of + "the rejection distance", calibration.rejection_distance);
-  check_not_negative(of + "the sure distance", calibration.sure_distance);
-  check_not_negative(of + "the typical distance", calibration.typical_distance);
-  check_not_negative(of + "the rejection score", calibration.rejection_score);
-  check_not_negative(of + "the typical score", calibration.typical_score);
-  check_not_negative(of + "the covered share", calibration.covered_share);
+  check_range(of + "the typical votes", calibration.typical_votes, 0, 1);
+  check_range(of + "the share of foreign windows", calibration.foreign_share, 0, 1);
 }
 
 void check_alignment(const std::string& of, const AlignmentEigenspace& space) {
@@ -145,9 +141,6 @@ void check_parts(const Model& model, const PartsModel& parts) {
   check_range("the step of query windows", parts.scale.query, 1e-12, 1e6);
   check_voting(parts.voting);
   check_not_negative("the noise of alignment", parts.noise);
-  check_range("the smallest rate", parts.smallest_rate, 0, 1);
-  check_not_negative("the sure ratio", parts.sure_ratio);
-  check_range("the least evidence of occluded objects", parts.covered_evidence, -1e12, unlimited);
   for (std::size_t o = 0; o < count; ++o) {
     const std::string of = "object \"" + model.objects[o].name + "\": ";
     const std::size_t views = check_views(of, parts, o, model.objects[o].workspace.size());
@@ -156,6 +149,35 @@ void check_parts(const Model& model, const PartsModel& parts) {
     check_alignment(of, parts.poses[o]);
     check_extents(of, parts, o, views);
   }
+}
+
+template <typename Values>
+void check_all_finite(const std::string& what, const Values& values) {
+  for (const double value : values)
+    if (!std::isfinite(value)) refuse(what + " are not finite");
+}
+
+void check_rates(const std::string& what, const DecisionRates& rates) {
+  check_range("the " + what + " rate of false rejections", rates.false_rejection, 0, 1);
+  check_range("the " + what + " rate of false acceptances", rates.false_acceptance, 0, 1);
+}
+
+void check_decision(const DecisionModel& decision) {
+  check_all_finite("the weights of the whole region", decision.weights.whole);
+  check_all_finite("the weights of windows", decision.weights.windows);
+  check_all_finite("the weights of occluded regions", decision.weights.occluded);
+  check_range("the required evidence", decision.required, -1e12, unlimited);
+  check_range("the evidence that settles", decision.settled, decision.required, unlimited);
+  check_rates("set", decision.set);
+  check_rates("expected", decision.expected);
+  for (const auto* evidence : {&decision.known, &decision.unknown}) {
+    check_all_finite("the evidence of learned views", *evidence);
+    if (!std::ranges::is_sorted(*evidence)) refuse("the evidence of learned views is not in order");
+  }
+  for_each_constant(decision.tuning, [](const char* name, double value) {
+    if (!std::isfinite(value)) refuse("the constant " + std::string(name) + " is not finite");
+  });
+  check_range("the effective dimensions", decision.tuning.effective_dimensions, 1e-6, 1e6);
 }
 
 }  // namespace
@@ -170,6 +192,7 @@ void check_model(const Model& model) {
     if (!names.insert(object.name).second) refuse("two objects are named \"" + object.name + "\"");
     check_object(model, object);
   }
+  check_decision(model.decision);
   if (model.parts) check_parts(model, *model.parts);
 }
 

@@ -1,5 +1,7 @@
 #include "core/model/model_file.h"
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <new>
 #include <stdexcept>
@@ -18,7 +20,7 @@
 namespace eigenpose {
 namespace {
 
-constexpr SealedFormat model_format{"eigenpose model\n", 3,
+constexpr SealedFormat model_format{"eigenpose model\n", 4,
                                     "is not an eigenpose model; 'eigenpose learn' makes them",
                                     "learn it again from its image sets"};
 
@@ -40,7 +42,6 @@ Eigenspace read_eigenspace(const Hdf5Group& group) {
 
 void write_object(const Hdf5Group& group, const ModelObject& object) {
   group.write("name", object.name);
-  group.write("rejection_distance", object.rejection_distance);
   group.write("typical_distance", object.typical_distance);
   group.write("pose_observable", std::int64_t{object.pose_observable});
   group.write("views", static_cast<std::int64_t>(object.views));
@@ -83,13 +84,70 @@ ModelObject read_object(const Hdf5Group& group) {
   ModelObject object{
       group.read_text("name"), Workspace(std::move(dofs)),
       Manifold::from_coefficients(std::move(sample_axes), group.read_doubles("coefficients"), degree)};
-  object.rejection_distance = group.read_double("rejection_distance");
   object.typical_distance = group.read_double("typical_distance");
   object.dof_observable = std::move(observable);
   object.pose_observable = group.read_bool("pose_observable");
   object.space = std::move(space);
   object.views = static_cast<std::size_t>(group.read_integer("views", 0, std::int64_t{1} << 31));
   return object;
+}
+
+template <std::size_t n>
+void write_weights(const Hdf5Group& group, const std::string& name, const std::array<double, n>& weights) {
+  group.write(name, Eigen::MatrixXd(Eigen::Map<const Eigen::VectorXd>(weights.data(), n)));
+}
+
+template <std::size_t n>
+void read_weights(const Hdf5Group& group, const std::string& name, std::array<double, n>& weights) {
+  const Eigen::MatrixXd read = group.read_doubles(name);
+  if (read.size() != static_cast<Eigen::Index>(n))
+    throw std::invalid_argument("the weights of the evidence are " + std::to_string(read.size()) +
+                                " instead of " + std::to_string(n));
+  std::copy_n(read.data(), n, weights.begin());
+}
+
+void write_evidence(const Hdf5Group& group, const std::string& name, const std::vector<double>& evidence) {
+  group.write(name, Eigen::MatrixXd(Eigen::Map<const Eigen::VectorXd>(
+                        evidence.data(), static_cast<Eigen::Index>(evidence.size()))));
+}
+
+std::vector<double> read_evidence(const Hdf5Group& group, const std::string& name) {
+  const Eigen::MatrixXd read = group.read_doubles(name);
+  return {read.data(), read.data() + read.size()};
+}
+
+void write_decision(const Hdf5Group& group, const DecisionModel& decision) {
+  write_weights(group, "whole_weights", decision.weights.whole);
+  write_weights(group, "windows_weights", decision.weights.windows);
+  write_weights(group, "occluded_weights", decision.weights.occluded);
+  group.write("required", decision.required);
+  group.write("settled", decision.settled);
+  group.write("set_false_rejection", decision.set.false_rejection);
+  group.write("set_false_acceptance", decision.set.false_acceptance);
+  group.write("expected_false_rejection", decision.expected.false_rejection);
+  group.write("expected_false_acceptance", decision.expected.false_acceptance);
+  write_evidence(group, "known_evidence", decision.known);
+  write_evidence(group, "unknown_evidence", decision.unknown);
+  const Hdf5Group tuning = group.make_group("tuning");
+  for_each_constant(decision.tuning, [&](const char* name, double value) { tuning.write(name, value); });
+}
+
+DecisionModel read_decision(const Hdf5Group& group) {
+  DecisionModel decision;
+  read_weights(group, "whole_weights", decision.weights.whole);
+  read_weights(group, "windows_weights", decision.weights.windows);
+  read_weights(group, "occluded_weights", decision.weights.occluded);
+  decision.required = group.read_double("required");
+  decision.settled = group.read_double("settled");
+  decision.set = {group.read_double("set_false_rejection"), group.read_double("set_false_acceptance")};
+  decision.expected = {group.read_double("expected_false_rejection"),
+                       group.read_double("expected_false_acceptance")};
+  decision.known = read_evidence(group, "known_evidence");
+  decision.unknown = read_evidence(group, "unknown_evidence");
+  const Hdf5Group tuning = group.open_group("tuning");
+  for_each_constant(decision.tuning,
+                    [&](const char* name, double& value) { value = tuning.read_double(name); });
+  return decision;
 }
 
 void write_content(const Hdf5Group& root, const Model& model) {
@@ -99,6 +157,7 @@ void write_content(const Hdf5Group& root, const Model& model) {
   for (std::size_t i = 0; i < model.objects.size(); ++i)
     write_object(objects.make_group(numbered(i)), model.objects[i]);
   if (model.parts) write_parts(root.make_group("parts"), *model.parts);
+  write_decision(root.make_group("decision"), model.decision);
   const Hdf5Group provenance = root.make_group("provenance");
   provenance.write("program_version", model.provenance.program_version);
   provenance.write("created", model.provenance.created);
@@ -120,6 +179,7 @@ Model read_content(const std::filesystem::path& path) {
     model.objects.push_back(read_object(objects.open_group(name)));
   if (root.has("parts"))
     model.parts = std::make_shared<const PartsModel>(read_parts(root.open_group("parts"), model.objects));
+  model.decision = read_decision(root.open_group("decision"));
   const Hdf5Group provenance = root.open_group("provenance");
   model.provenance.program_version = provenance.read_text("program_version");
   model.provenance.created = provenance.read_text("created");

@@ -139,19 +139,12 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
   group.write("query_step", static_cast<double>(parts.scale.query));
   write_voting(group.make_group("voting"), parts.voting);
   group.write("noise", parts.noise);
-  group.write("smallest_rate", parts.smallest_rate);
-  group.write("sure_ratio", parts.sure_ratio);
-  group.write("covered_evidence", parts.covered_evidence);
   const Hdf5Group objects = group.make_group("objects");
   for (std::size_t o = 0; o < parts.objects.size(); ++o) {
     const Hdf5Group object = objects.make_group(numbered(o));
     write_windows(object, parts.objects[o]);
-    object.write("rejection_distance", parts.calibration[o].rejection_distance);
-    object.write("sure_distance", parts.calibration[o].sure_distance);
-    object.write("typical_distance", parts.calibration[o].typical_distance);
-    object.write("rejection_score", parts.calibration[o].rejection_score);
-    object.write("typical_score", parts.calibration[o].typical_score);
-    object.write("covered_share", parts.calibration[o].covered_share);
+    object.write("typical_votes", parts.calibration[o].typical_votes);
+    object.write("foreign_share", parts.calibration[o].foreign_share);
     object.write("extents",
                  extents_matrix(o < parts.extents.size() ? parts.extents[o] : std::vector<cv::Size>()));
     const AlignmentEigenspace& pose = parts.poses[o];
@@ -183,19 +176,12 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
   // Files of before these options were kept have what was the default then.
   if (group.has("voting")) parts.voting = read_voting(group.open_group("voting"));
   parts.noise = group.read_double("noise");
-  parts.smallest_rate = group.read_double("smallest_rate");
-  parts.sure_ratio = group.read_double("sure_ratio");
-  parts.covered_evidence = group.read_double("covered_evidence");
   for (std::size_t o = 0; o < names.size(); ++o) {
     const Hdf5Group object = stored.open_group(names[o]);
     parts.objects.push_back(read_windows(object, parts.scale));
     PartsCalibration calibration;
-    calibration.rejection_distance = object.read_double("rejection_distance");
-    calibration.sure_distance = object.read_double("sure_distance");
-    calibration.typical_distance = object.read_double("typical_distance");
-    calibration.rejection_score = object.read_double("rejection_score");
-    calibration.typical_score = object.read_double("typical_score");
-    calibration.covered_share = object.read_double("covered_share");
+    calibration.typical_votes = object.read_double("typical_votes");
+    calibration.foreign_share = object.read_double("foreign_share");
     parts.calibration.push_back(calibration);
     parts.extents.push_back(read_extents(object.read_doubles("extents"), parts.objects.back()));
     const Hdf5Group coarse = object.open_group("coarse");

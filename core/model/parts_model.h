@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,18 +16,10 @@
 
 namespace eigenpose {
 
-/// What an object's own views say of how well it is matched.
+/// What an object's own views say of how well its windows match.
 struct PartsCalibration {
-  /// A whole region farther from the manifold after alignment, in the universal eigenspace, is unknown: see
-  /// calibrate_match.
-  double rejection_distance = 0.0;
-  double sure_distance = 0.0;     ///< beyond it, windows must agree that it is the object
-  double typical_distance = 0.0;  ///< root mean square of new views of the object
-  /// A score is the share of window votes that the best pose does not get: 0 is perfect, 1 nothing in common;
-  /// see calibrate_parts.
-  double rejection_score = 1.0;  ///< a region with a larger score is unknown
-  double typical_score = 0.1;    ///< mean score of the object's own views
-  double covered_share = 0.1;    ///< a region with a larger share of foreign windows is taken as covered
+  double typical_votes = 0.5;  ///< share of the windows' weight that a new view of the object gets, mean
+  double foreign_share = 0.1;  ///< a region with a larger share of foreign windows may be occluded
 };
 
 /// Everything partial matching and alignment know. Immutable once learned; share it between threads.
@@ -48,14 +39,6 @@ struct PartsModel {
   /// of an object that came ready-cut; nothing at all where all objects did. Separates objects that touch, as
   /// long as the camera stays where it was.
   std::vector<std::vector<cv::Size>> extents;
-
-  /// The whole region settles which object it is when its squared distance is below this times that of the
-  /// nearest other object: see calibrate_match.
-  double sure_ratio = 0.3;
-  /// A covered region with less evidence is unknown: see covered_calibration.h.
-  double covered_evidence = std::numeric_limits<double>::infinity();
-  /// The smallest rate of wrong rejections that the number of learned views can support, 1/(n + 1).
-  double smallest_rate = 1.0;
 
   /// Bytes held for one object.
   [[nodiscard]] std::size_t memory(std::size_t object) const {

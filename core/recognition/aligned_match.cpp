@@ -13,6 +13,30 @@ SeparateSearches::SeparateSearches(std::span<const Manifold> manifolds) {
   for (const Manifold& manifold : manifolds) searches_.push_back(make_search("tree", {&manifold, 1}));
 }
 
+RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ManifoldSearch& all,
+                              const SeparateSearches& separate, const ComparedObject& object, double reach) {
+  RealignedDistance result;
+  std::array<ClosestPoint, 3> near;
+  // The object itself and the absent one may stand before the nearest other.
+  const std::size_t wanted = object.absent ? 3 : 2;
+  const std::size_t count = all.nearest_into(point, std::span(near).first(wanted), reach);
+  bool seen = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (near[i].manifold == object.object) {
+      result.own = near[i].distance;
+      seen = true;
+    } else if (!result.other && near[i].manifold != object.absent) {
+      result.other = near[i];
+    }
+  }
+  if (!seen) {
+    std::array<ClosestPoint, 1> own;
+    (void)separate[object.object].nearest_into(point, own);
+    result.own = own[0].distance;
+  }
+  return result;
+}
+
 AlignedMatch::AlignedMatch(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
                            double reach)
     : model_(model),
@@ -31,7 +55,7 @@ AlignedMatch::AlignedMatch(const Model& model, const ManifoldSearch& all, const 
       point_(model.eigenspace.components()) {}
 
 RealignedDistance AlignedMatch::distance(std::span<const float> picture, const Misalignment& misalignment,
-                                         std::size_t object) {
+                                         const ComparedObject& object) {
   const std::span<float> appearance(appearance_.data(), static_cast<std::size_t>(appearance_.size()));
   const bool typed = !maker_.is_picture();
   float energy = undo_misalignment(picture, model_.normalization.size, picture_bands(model_.normalization),
@@ -40,24 +64,7 @@ RealignedDistance AlignedMatch::distance(std::span<const float> picture, const M
   project_onto(model_.eigenspace.basis, appearance_, point_);
   point_ /= std::max(energy, 1e-9F);
   point_ -= mean_point_;
-  RealignedDistance result;
-  std::array<ClosestPoint, 2> near;
-  const std::size_t count = all_.nearest_into(point_, near, reach_);
-  bool seen = false;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (near[i].manifold == object) {
-      result.own = near[i].distance;
-      seen = true;
-    } else if (!result.other) {
-      result.other = near[i];
-    }
-  }
-  if (!seen) {
-    std::array<ClosestPoint, 1> own;
-    (void)separate_[object].nearest_into(point_, own);
-    result.own = own[0].distance;
-  }
-  return result;
+  return distance_to(point_, all_, separate_, object, reach_);
 }
 
 }  // namespace eigenpose

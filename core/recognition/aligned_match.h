@@ -26,6 +26,12 @@ struct RealignedDistance {
   std::optional<ClosestPoint> other;  ///< the nearest of the others within reach of the search
 };
 
+/// The object that a region is compared with.
+struct ComparedObject {
+  std::size_t object = 0;
+  std::optional<std::size_t> absent = std::nullopt;  ///< another that counts as not learned
+};
+
 /// One search for each manifold alone. Immutable once made; const calls are thread-safe: make it once, share
 /// it.
 class SeparateSearches {
@@ -38,6 +44,11 @@ class SeparateSearches {
  private:
   std::vector<std::unique_ptr<ManifoldSearch>> searches_;
 };
+
+/// Distances of a point to `object` and to the nearest of the others but `absent`, which are looked for
+/// within `reach`.
+RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ManifoldSearch& all,
+                              const SeparateSearches& separate, const ComparedObject& object, double reach);
 
 /// Aligns one region after the other. Holds scratch memory: one thread at a time.
 class AlignedMatch {
@@ -53,7 +64,7 @@ class AlignedMatch {
 
   /// @param picture as the normaliser makes it. @param misalignment of `object` in it.
   RealignedDistance distance(std::span<const float> picture, const Misalignment& misalignment,
-                             std::size_t object);
+                             const ComparedObject& object);
 
   /// The realigned region in the universal eigenspace, as `distance` saw it last.
   [[nodiscard]] const Eigen::VectorXf& point() const { return point_; }

@@ -1,11 +1,63 @@
 #pragma once
 
-/// Constants of the decision rule that calibration and evaluation apply as well.
+/// The decision: how much speaks for the object that a region resembles most, against an unknown one.
+///
+/// **Evidence** is the log-odds that a region shows object o rather than an unknown one, where both are
+/// equally frequent, linear in what was measured (logistic regression; Berkson 1944):
+///
+///     Λ(o) = w · φ(o)
+///
+/// with the terms φ of one of three hypotheses, below. The distance d of a known view grows with its object's
+/// own interpolation error s, that of an unknown one does not: with both logarithms normal, their likelihood
+/// ratio is linear in ln d and ln s. Weights are learned from the model's own views (core/learning/
+/// calibration). A region gets the name of the object with the most evidence, if that is at least
+/// DecisionModel::required.
+///
+/// **Confidence** is the posterior that the best object b is right, beside the second best r and an unknown
+/// object: e^Λ(b) / (e^Λ(b) + e^Λ(r) + 1).
+
+#include <array>
+#include <optional>
+
+#include "core/model/decision_model.h"
 
 namespace eigenpose {
 
-/// A region that is occluded by more than this share is reported as unknown.
-inline constexpr double max_occluded_share = 0.5;
+/// One object compared with the whole region, after alignment where the model aligns.
+struct WholeMatch {
+  double distance = 0.0;  ///< d: to the object's manifold in the universal eigenspace
+  double typical = 0.0;   ///< s: root mean square of new views of the object
+  double other = 2.0;     ///< to the nearest of the other manifolds
+};
+
+/// Votes of the windows for one object.
+struct WindowsMatch {
+  double votes = 0.0;           ///< share of the windows' weight for its best view, 0…1
+  double typical_votes = 0.0;   ///< the same of new views of the object, mean
+  double discriminating = 0.0;  ///< share beyond what many objects have in common
+  std::optional<double> next;   ///< the same of the best of the other objects, if there are any
+};
+
+/// A pose of one object compared with what is visible of a region.
+struct OccludedMatch {
+  WindowsMatch windows;
+  double occluded = 0.0;          ///< share of the windows that do not show the object, 0…1
+  double merit = 0.0;             ///< of the pose, see parts_recognizer.h
+  double unexplained = 0.0;       ///< share of the pixels that the pose leaves unexplained, 0…1
+  double foreign_likeness = 0.0;  ///< mean likeness of the windows that do not show the object
+};
+
+std::array<double, 3> whole_terms(const WholeMatch& match);
+std::array<double, 8> windows_terms(const WholeMatch& whole, const WindowsMatch& windows);
+std::array<double, 9> occluded_terms(const OccludedMatch& match);
+
+/// Λ of the three hypotheses.
+double evidence_of(const EvidenceWeights& weights, const WholeMatch& match);
+double evidence_of(const EvidenceWeights& weights, const WholeMatch& whole, const WindowsMatch& windows);
+double evidence_of(const EvidenceWeights& weights, const OccludedMatch& match);
+
+/// The posterior of the best object. @param second the evidence of the next; −∞ without.
+double confidence_of(double best, double second);
 
 /// Two poses are distinct when they differ by more than this share of a DOF's range.
 inline constexpr double poses_apart = 1.0 / 12.0;

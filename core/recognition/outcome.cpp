@@ -22,6 +22,12 @@ std::string_view verdict_name(Verdict verdict) {
   return "unknown";
 }
 
+Verdict verdict_of(const DecisionModel& decision, double evidence, double second) {
+  if (evidence < decision.required) return Verdict::unknown;
+  const bool two = second > evidence - decision.tuning.ambiguous_lead && second >= decision.required;
+  return two ? Verdict::ambiguous : Verdict::recognized;
+}
+
 void Outcome::set_covariance(std::span<const double> covariance, double scale,
                              const std::vector<bool>& observable) {
   const std::size_t m = observable.size();
@@ -64,7 +70,6 @@ void HypothesisPool::clear(Outcome& outcome) {
   give_back(outcome.other_pose);
   outcome.q_sigma.clear();
   outcome.q_covariance.clear();
-  outcome.rejection_distance = 0.0;
   outcome.evidence = 0.0;
   outcome.required_evidence = 0.0;
   outcome.covered_share = 0.0;

@@ -10,12 +10,14 @@
 
 #include <opencv2/core.hpp>
 
+#include "core/model/decision_model.h"
+
 namespace eigenpose {
 
 /// Recognised, or why not. Everything but `recognized` is an ordinary result, not an error.
 enum class Verdict {
   recognized,
-  unknown,         ///< farther from every manifold than its rejection distance
+  unknown,         ///< too little evidence for any learned object
   ambiguous,       ///< two objects fit about as well
   touches_border,  ///< part of it may lie outside the picture
   too_small,       ///< fewer pixels than the model needs
@@ -23,6 +25,9 @@ enum class Verdict {
 
 /// "recognized", "unknown", "ambiguous", "touches_border", "too_small": stable names used in JSON.
 std::string_view verdict_name(Verdict verdict);
+
+/// The decision. @param evidence for the best object, @param second for the next; −∞ without.
+Verdict verdict_of(const DecisionModel& decision, double evidence, double second);
 
 /// One object and pose that fits a region.
 struct Hypothesis {
@@ -47,7 +52,6 @@ struct Outcome {
   std::vector<double> q_sigma;
   /// Of `best->q`, m × m, row by row; its diagonal is q_sigma².
   std::vector<double> q_covariance;
-  double rejection_distance = 0.0;  ///< of the best object; `best->distance` is compared with it
   /// Log-odds (natural logarithm) that the region shows the best object rather than an unknown one.
   double evidence = 0.0;
   /// The region is unknown with less evidence than this: it holds the two rates that were set.
@@ -55,11 +59,8 @@ struct Outcome {
   /// Share of the region that does not show the best object: something occludes it, or stands beside it. A
   /// partly occluded object is recognised by its windows, whatever its distance.
   double covered_share = 0.0;
-  /// 0…1; approaches ½ at the rejection threshold and falls below it beyond. The probability that the best
-  /// object is right, if regions of the best object, of the runner-up and of an unknown object at the
-  /// rejection distance are equally frequent and distances are normal: 1/(1 + L(runner-up) + L(rejection)),
-  /// L(d) = exp(−(d² − d_best²) /2σ²), σ² = typical distance²/6 (see likelihood.h). Where windows decided,
-  /// the first term is replaced by the runner-up's share of votes: (1 − occluded)·(1 − ½·v₂/v)/(1 + L).
+  /// The posterior that the best object is right, 0…1, where learned and unknown objects are equally
+  /// frequent: see decision.h.
   double confidence = 0.0;
   /// The search for touching objects in this region was ended by a limit: it may show more objects, or
   /// others.

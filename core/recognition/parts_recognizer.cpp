@@ -31,12 +31,8 @@ constexpr double unexplained_merit = 0.1;
 /// most votes.
 constexpr std::size_t most_rivals = 4;
 constexpr double rival_votes = 0.8;
-/// It is a tie when the second object has at least this share of the votes, or at most this much less merit.
-constexpr double tied_votes = 0.97;
-constexpr double tied_merit = 2.0;
-/// Weight of the votes in the evidence: see the header.
-constexpr double vote_evidence = 5.0;
-constexpr float familiar_likeness = 0.6F;  // a window with this κ is fully trusted
+constexpr float familiar_likeness = 0.6F;                 // a window with this κ is fully trusted
+constexpr double most_unexplained = 0.5 * 9.0 * 32 * 32;  // every pixel 3 σ off
 constexpr double masked_reach = 12.0 / 360.0;
 
 /// Votes of the learned views next to a pose: the best of those within one step in every DOF; where the views
@@ -83,8 +79,9 @@ struct OccludedAnswer {
 };
 
 struct PartsRecognizer::Impl {
-  explicit Impl(const PartsModel& learned)
+  Impl(const PartsModel& learned, const DecisionModel& rule)
       : model(learned),
+        decision(rule),
         mapper(learned.background),
         matcher(learned.objects, learned.scale, learned.voting),
         rematcher(learned.objects, learned.scale, learned.voting),
@@ -98,6 +95,7 @@ struct PartsRecognizer::Impl {
   }
 
   const PartsModel& model;
+  const DecisionModel& decision;
   AlignmentOptions options;
   OrientationGridMaker mapper;
   PartialMatcher matcher;    ///< of the picture as it is
@@ -123,11 +121,15 @@ struct PartsRecognizer::Impl {
   std::vector<float> aligned_votes;  ///< the same in the aligned one
   std::vector<float> likeness;
   std::vector<float> background;
+  double mean_foreign = 0.0;  ///< mean κ of the windows that foreign_share counted last
 
   const PosePicture& posed();
   void vote(std::span<const std::size_t> shortlist);
-  PartsAnswer settle(std::size_t object, Occlusion occlusion);
-  PartsIdentification identify(Occlusion occlusion);
+  void vote_without(std::size_t object, std::span<const int> views);
+  WindowsMatch match_of(std::size_t object, const std::vector<float>& plain) const;
+  PartsIdentification identify_occluded();
+  /// ln of the cost of the best pose over all pixels, over that of the best pose over the visible ones.
+  double gain_of_masking(const PartsAnswer& answer);
   const std::vector<float>& votes_of(std::size_t object);
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   double foreign_share(std::size_t object, int candidate);
@@ -137,7 +139,9 @@ struct PartsRecognizer::Impl {
   OccludedAnswer approach_occluded(std::size_t object, const std::vector<float>& plain, double occluded);
   /// Follows the starts of this merit and more to the end.
   void refine_occluded(OccludedAnswer& found, double hopeless);
-  void identify_occluded(PartsIdentification& found);
+  /// Objects that may be occluded here, best first, each with a pose. The second is there if any other was
+  /// voted for.
+  std::vector<OccludedAnswer> find_rivals();
   /// The pose of a candidate, moved by the parabola through its neighbours' votes.
   [[nodiscard]] PoseVector voted_pose(std::size_t object, const std::vector<float>& plain,
                                       int candidate) const;
@@ -174,9 +178,15 @@ double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const Pa
 
 double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
   matcher.window_likeness(object, candidate, likeness, background);
-  const auto foreign =
-      std::count_if(likeness.begin(), likeness.end(), [](float k) { return k < foreign_likeness; });
-  return static_cast<double>(foreign) / static_cast<double>(likeness.size());
+  double count = 0.0;
+  double sum = 0.0;
+  for (const float kappa : likeness) {
+    if (kappa >= foreign_likeness) continue;
+    count += 1.0;
+    sum += static_cast<double>(kappa);
+  }
+  mean_foreign = count > 0.0 ? sum / count : 0.0;
+  return count / static_cast<double>(likeness.size());
 }
 
 double PartsRecognizer::Impl::occluded_share(std::size_t object, const std::vector<float>& plain) {
@@ -232,8 +242,8 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
     return window_count * pose.votes - 0.5 * pose.cost / model.noise;
   };
   for (const AlignedPose& found : aligner.align(posed(), space)) {
-    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
-                   0.0};
+    PartsPose pose{
+        found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0, 0.0, 0.0};
     pose.votes = votes_near(plain, parts, space, model.view_poses[object], pose.q) / windows.total_weight;
     pose.merit = merit(pose);
     answer.poses.push_back(pose);
@@ -247,7 +257,6 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
       break;
     }
     const double share = share_after_alignment(object, pose);
-    answer.score = std::min(answer.score, 1.0 - share);
     pose.votes = 0.5 * (pose.votes + share);
     pose.merit = merit(pose);
   }
@@ -301,6 +310,7 @@ OccludedAnswer PartsRecognizer::Impl::approach_occluded(std::size_t object, cons
   foreign_share(object, peaks.front());
   found.trust = pixel_trust();
   masked_aligner.look(posed(), model.poses[object], found.trust);
+  found.answer.foreign_likeness = mean_foreign;
   found.starts.reserve(peaks.size());
   for (const int peak : peaks) {
     OccludedStart start{masked_aligner.approach(voted_pose(object, plain, peak), masked_reach),
@@ -324,13 +334,14 @@ void PartsRecognizer::Impl::refine_occluded(OccludedAnswer& found, double hopele
     const double merit = vote_merit * start.votes -
                          visible_merit * std::log(std::max(pose.cost, model.noise)) -
                          unexplained_merit * start.pose.unexplained;
-    answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit});
+    answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit,
+                            start.pose.unexplained / most_unexplained});
   }
   insertion_sort(answer.poses, [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
-  if (!answer.poses.empty()) answer.score = 1.0 - answer.poses.front().votes;
 }
 
-PartsRecognizer::PartsRecognizer(const PartsModel& model) : impl_(std::make_unique<Impl>(model)) {}
+PartsRecognizer::PartsRecognizer(const PartsModel& model, const DecisionModel& decision)
+    : impl_(std::make_unique<Impl>(model, decision)) {}
 PartsRecognizer::~PartsRecognizer() = default;
 PartsRecognizer::PartsRecognizer(PartsRecognizer&&) noexcept = default;
 PartsRecognizer& PartsRecognizer::operator=(PartsRecognizer&&) noexcept = default;
@@ -365,12 +376,6 @@ PartsRecognizer::Votes PartsRecognizer::Look::vote(std::span<const std::size_t> 
   return {*impl_, impl_->votes};
 }
 
-PartsIdentification PartsRecognizer::Look::identify(std::span<const std::size_t> shortlist,
-                                                    Occlusion occlusion) const {
-  impl().vote(shortlist);
-  return impl_->identify(occlusion);
-}
-
 PartsRecognizer::Impl& PartsRecognizer::Votes::impl() const {
   if (vote_ != impl_->votes)
     throw std::logic_error("the recogniser has taken other votes since; use what vote() returned last");
@@ -381,13 +386,36 @@ std::span<const PartialVote> PartsRecognizer::Votes::ranked() const {
   return impl().ranked;
 }
 
-double PartsRecognizer::Votes::share_of(std::size_t object) const {
+WindowsMatch PartsRecognizer::Votes::match(std::size_t object) const {
   const std::vector<float>& plain = impl().votes_of(object);
-  return static_cast<double>(*std::ranges::max_element(plain) / impl_->windows.total_weight);
+  return impl_->match_of(object, plain);
 }
 
-PartsAnswer PartsRecognizer::Votes::settle(std::size_t object, Occlusion occlusion) const {
-  return impl().settle(object, occlusion);
+double PartsRecognizer::Votes::occluded_share(std::size_t object) const {
+  const std::vector<float>& plain = impl().votes_of(object);
+  return impl_->occluded_share(object, plain);
+}
+
+PartsAnswer PartsRecognizer::Votes::settle(std::size_t object) const {
+  const std::vector<float>& plain = impl().votes_of(object);
+  const double share = impl_->occluded_share(object, plain);
+  if (share <= impl_->model.calibration[object].foreign_share) return impl_->find_poses(object, plain, share);
+  OccludedAnswer found = impl_->approach_occluded(object, plain, share);
+  impl_->refine_occluded(found, found.starts.front().merit - hopeless_merit);
+  return found.answer;
+}
+
+PartsIdentification PartsRecognizer::Votes::identify_occluded() const {
+  return impl().identify_occluded();
+}
+
+double PartsRecognizer::Votes::gain_of_masking(const PartsAnswer& answer) const {
+  return impl().gain_of_masking(answer);
+}
+
+PartsRecognizer::Votes PartsRecognizer::Votes::without(std::size_t object, std::span<const int> views) const {
+  impl().vote_without(object, views);
+  return {*impl_, impl_->votes};
 }
 
 void PartsRecognizer::Impl::vote(std::span<const std::size_t> shortlist) {
@@ -400,17 +428,29 @@ void PartsRecognizer::Impl::vote(std::span<const std::size_t> shortlist) {
   ranked = matcher.match(windows, shortlist.empty() ? std::span<const std::size_t>(everything) : shortlist);
 }
 
-PartsAnswer PartsRecognizer::Impl::settle(std::size_t object, Occlusion occlusion) {
-  const std::vector<float>& plain = votes_of(object);
-  const double share = occluded_share(object, plain);
-  if (occlusion == Occlusion::measured && share <= model.calibration[object].covered_share)
-    return find_poses(object, plain, share);
-  OccludedAnswer found = approach_occluded(object, plain, share);
-  refine_occluded(found, found.starts.front().merit - hopeless_merit);
-  return found.answer;
+void PartsRecognizer::Impl::vote_without(std::size_t object, std::span<const int> views) {
+  std::vector<int> candidates;
+  const PartsObject& parts = model.objects[object];
+  for (std::size_t c = 0; c < parts.candidates.size(); ++c)
+    if (std::ranges::find(views, parts.candidates[c].view) != views.end())
+      candidates.push_back(static_cast<int>(c));
+  ranked = matcher.match_without(object, candidates);
+  ++votes;
 }
 
-void PartsRecognizer::Impl::identify_occluded(PartsIdentification& found) {
+WindowsMatch PartsRecognizer::Impl::match_of(std::size_t object, const std::vector<float>& plain) const {
+  const auto share = [this](float sum) { return static_cast<double>(sum / windows.total_weight); };
+  WindowsMatch match;
+  match.votes = share(*std::ranges::max_element(plain));
+  match.typical_votes = model.calibration[object].typical_votes;
+  match.discriminating = share(std::ranges::find(ranked, object, &PartialVote::object)->score);
+  const auto next =
+      std::ranges::find_if(ranked, [object](const PartialVote& vote) { return vote.object != object; });
+  if (next != ranked.end()) match.next = share(next->score);
+  return match;
+}
+
+std::vector<OccludedAnswer> PartsRecognizer::Impl::find_rivals() {
   std::vector<OccludedAnswer> rivals;
   const auto approach = [&](const PartialVote& vote) {
     const std::vector<float>& plain = votes_of(vote.object);
@@ -434,42 +474,33 @@ void PartsRecognizer::Impl::identify_occluded(PartsIdentification& found) {
     if (!rival.answer.poses.empty()) continue;
     const OccludedStart& start = rival.starts.front();
     const AlignedPose& pose = start.pose.aligned;
-    rival.answer.score = 1.0 - start.votes;
     rival.answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes,
                                   best - std::max(most - start.merit, hopeless_merit)});
   }
   const auto refined = std::span(rivals).first(contenders);
   std::ranges::stable_sort(refined, std::greater<>(),
                            [](const OccludedAnswer& rival) { return rival.answer.poses.front().merit; });
-  found.best = rivals[0].answer;
-  if (rivals.size() > 1) found.second = rivals[1].answer;
+  return rivals;
 }
 
-PartsIdentification PartsRecognizer::Impl::identify(Occlusion occlusion) {
-  const std::size_t first = ranked[0].object;
-  const std::vector<float>& plain = votes_of(first);
-  const double share = occluded_share(first, plain);
-  const bool occluded = occlusion == Occlusion::assumed || share > model.calibration[first].covered_share;
+double PartsRecognizer::Impl::gain_of_masking(const PartsAnswer& answer) {
+  const auto above_noise = [this](double cost) { return std::log(std::max(cost, model.noise)); };
+  return above_noise(aligner.align(posed(), model.poses[answer.object]).front().cost) -
+         above_noise(answer.poses.front().cost);
+}
+
+PartsIdentification PartsRecognizer::Impl::identify_occluded() {
+  const std::vector<OccludedAnswer> rivals = find_rivals();
   PartsIdentification found;
-  if (occluded) {
-    identify_occluded(found);
-  } else {
-    found.best = find_poses(first, plain, share);
-    if (ranked.size() > 1 && ranked[1].score > 0.0F)
-      found.second = settle(ranked[1].object, Occlusion::measured);
-  }
-  const auto votes_for = [&](const PartsAnswer& answer) {
-    return static_cast<double>(std::ranges::find(ranked, answer.object, &PartialVote::object)->score);
-  };
-  const double own = std::max(votes_for(found.best), 1e-9);
-  if (found.second) found.second_share = votes_for(*found.second) / own;
-  if (occluded) {
-    const PartsPose& pose = found.best.poses.front();
-    found.tie = found.second && found.second->poses.front().merit > pose.merit - tied_merit;
-    found.evidence = vote_evidence * own / (windows.total_weight * std::max(1.0 - found.best.occluded, 0.1)) -
-                     std::log(std::max(pose.cost, model.noise)) - found.second_share;
-  } else {
-    found.tie = found.second_share > tied_votes;
+  found.best = rivals[0].answer;
+  const double merit = found.best.poses.front().merit;
+  found.match = {match_of(found.best.object, votes_of(found.best.object)), found.best.occluded, merit,
+                 found.best.poses.front().unexplained, found.best.foreign_likeness};
+  found.evidence = evidence_of(decision.weights, found.match);
+  found.second_evidence = -std::numeric_limits<double>::infinity();
+  if (rivals.size() > 1) {
+    found.second = rivals[1].answer;
+    found.second_evidence = found.evidence - (merit - found.second->poses.front().merit);
   }
   return found;
 }

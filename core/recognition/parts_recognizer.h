@@ -13,15 +13,6 @@
 /// log-likelihood up to a constant if every window is one observation and c/ν is χ². The second is not: its
 /// weights were chosen by measuring poses of learned views under synthetic occlusion. It may be compared
 /// between objects.
-///
-/// **Evidence** for an occluded object, with o the occluded share of the windows and v₂/v the votes of the
-/// next object over its own:
-///
-///     evidence = 5·v/(1 − o) − ln max(c, ν) − v₂/v
-///
-/// It orders regions by the log-odds that they show the object rather than an unknown one. It has no zero of
-/// its own: the model's covered_evidence is the value that unknown views reach at the rate of false
-/// acceptances (see occlusion_calibration.h).
 
 #include <cstdint>
 #include <memory>
@@ -32,6 +23,7 @@
 #include "core/alignment/alignment.h"
 #include "core/base/bounded_vector.h"
 #include "core/model/parts_model.h"
+#include "core/recognition/decision.h"
 
 namespace eigenpose {
 
@@ -43,41 +35,39 @@ struct PartsPose {
   double cost = 0.0;   ///< squared distance in the alignment eigenspace after alignment
   double votes = 0.0;  ///< share of the windows' weight that votes for this pose, 0…1
   double merit = 0.0;  ///< see above
+  /// Share of the pixels that the pose leaves unexplained, where the object is occluded: u over its largest.
+  double unexplained = 0.0;
 };
 
 /// The answer for one region.
 struct PartsAnswer {
   std::size_t object = 0;
   BoundedVector<PartsPose, most_poses> poses;  ///< of `object`, best first, never empty
-  double score = 1.0;     ///< 1 − votes of the best pose; compare with the object's rejection score
-  double occluded = 0.0;  ///< share of the windows that do not show the object, 0…1
+  double occluded = 0.0;                       ///< share of the windows that do not show the object, 0…1
+  double foreign_likeness = 0.0;               ///< mean likeness κ of these, where the object is occluded
 };
 
-/// Which object the windows show.
+/// Which object an occluded region shows.
 struct PartsIdentification {
   PartsAnswer best;
   std::optional<PartsAnswer> second;  ///< the next object
-  double second_share = 0.0;          ///< its votes over those of the best, ≥ 0
-  double evidence = 0.0;              ///< where the best is occluded: see above
-  bool tie = false;                   ///< which of the two it is cannot be decided
+  OccludedMatch match;                ///< of the best
+  /// Λ of the best, and of the next: less by what its pose has less merit. −∞ without a second.
+  double evidence = 0.0;
+  double second_evidence = 0.0;
 };
 
-/// Whether a region is treated as occluded.
-enum class Occlusion {
-  measured,  ///< where more windows are foreign than in learned views
-  assumed,   ///< in any case: the merits of such answers can be compared
-};
-
-/// Recognises normalised regions. Holds scratch memory: one thread at a time; the model outlives it.
+/// Recognises normalised regions. Holds scratch memory: one thread at a time; both models outlive it.
 ///
-/// Each step returns what the next one needs: look → vote → settle. What a step returned is valid until the
-/// recogniser takes that step again; using it later throws std::logic_error.
+/// Each step returns what the next one needs: look → vote → settle or identify_occluded. What a step returned
+/// is valid until the recogniser takes that step again; using it later throws std::logic_error.
 class PartsRecognizer {
  public:
   class Look;
   class Votes;
 
-  explicit PartsRecognizer(const PartsModel& model);
+  /// @param decision its weights and constants are used; its thresholds are the caller's.
+  PartsRecognizer(const PartsModel& model, const DecisionModel& decision);
   ~PartsRecognizer();
   PartsRecognizer(PartsRecognizer&&) noexcept;
   PartsRecognizer& operator=(PartsRecognizer&&) noexcept;
@@ -97,10 +87,6 @@ class PartsRecognizer::Look {
   [[nodiscard]] const PosePicture& pose_picture() const;
   /// Lets the windows vote for all objects, or for those of `shortlist` (indices, all of the model).
   [[nodiscard]] Votes vote(std::span<const std::size_t> shortlist = {}) const;
-  /// Votes and settles. Objects that are alike in the visible part of an occluded region are compared pixel
-  /// by pixel.
-  [[nodiscard]] PartsIdentification identify(std::span<const std::size_t> shortlist = {},
-                                             Occlusion occlusion = Occlusion::measured) const;
 
  private:
   friend class PartsRecognizer;
@@ -116,11 +102,23 @@ class PartsRecognizer::Votes {
  public:
   /// All that were voted for, most votes first.
   [[nodiscard]] std::span<const PartialVote> ranked() const;
-  /// Share of the windows' weight that the best view of one object gets, background included, 0…1.
-  /// @throws std::invalid_argument for an object that was not voted for.
-  [[nodiscard]] double share_of(std::size_t object) const;
-  /// Pose of one object. @throws as share_of.
-  [[nodiscard]] PartsAnswer settle(std::size_t object, Occlusion occlusion = Occlusion::measured) const;
+  /// Votes for one object, and for the best of the others. @throws std::invalid_argument for an object that
+  /// was not voted for.
+  [[nodiscard]] WindowsMatch match(std::size_t object) const;
+  /// Share of the windows that do not show the view of an object with most votes, 0…1. @throws as match.
+  [[nodiscard]] double occluded_share(std::size_t object) const;
+  /// Poses of one object; on the visible pixels where more windows are foreign than in learned views.
+  /// @throws as match.
+  [[nodiscard]] PartsAnswer settle(std::size_t object) const;
+  /// The object of a partly occluded region. Objects that are alike in what is visible are compared pixel by
+  /// pixel.
+  [[nodiscard]] PartsIdentification identify_occluded() const;
+  /// How much better an occluded object's pose explains the pixels that it trusts than its best pose explains
+  /// all of them: ln of the ratio of their costs. Where nothing hides the object, about 0.
+  [[nodiscard]] double gain_of_masking(const PartsAnswer& answer) const;
+  /// The votes of the same windows if some learned views of an object had not been learned; all its views:
+  /// if the object had not. These votes are no longer valid. @throws as match.
+  [[nodiscard]] Votes without(std::size_t object, std::span<const int> views) const;
 
  private:
   friend class PartsRecognizer::Look;

@@ -2,50 +2,102 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
+#include "core/base/insertion_sort.h"
 #include "core/image/normalization.h"
 #include "core/recognition/decision.h"
-#include "core/recognition/likelihood.h"
 
 namespace eigenpose {
 namespace {
 
-/// A second pose is reported if its log-likelihood is at most this much below the best: a factor of 20.
-constexpr double likely_pose = 3.0;
-/// The best pose is not in doubt if all others are this much less likely (log-likelihood).
-constexpr double sure_pose = 8.0;
-/// The curvature of the cost underestimates σ: 68 % of left-out views lie within this many times of it.
-constexpr double sigma_inflation = 1.8;
-/// Other objects farther than this do not put a match in doubt.
-double reach_of_others(const Model& model) {
-  double largest = 0.0;
-  for (const PartsCalibration& own : model.parts->calibration)
-    largest = std::max(largest, own.rejection_distance);
-  return largest / std::sqrt(std::max(model.parts->sure_ratio, 1e-3));
+/// Other objects farther than this are no rivals, and terms of the evidence do not depend on them.
+constexpr double reach_of_others = 0.5;
+/// Objects with most votes that are compared with the whole region.
+constexpr std::size_t most_voted = 2;
+
+/// Whether the windows see as much of one as of the other.
+bool tied(const DecisionModel& decision, const WholeCandidate& a, const WholeCandidate& b) {
+  const auto [less, more] = std::minmax(a.windows.votes, b.windows.votes);
+  return less >= decision.tuning.tied_votes * more;
+}
+
+/// Log-odds of one object over another. Where windows see as much of both, distances are compared: of a view
+/// of the object they are normal, with the variance of the typical one over the effective dimensions.
+double lead_of(const Model& model, const WholeCandidate& best, const WholeCandidate& second) {
+  if (!tied(model.decision, best, second)) return best.evidence - second.evidence;
+  const auto squared = [](const WholeCandidate& candidate) {
+    return candidate.distance.own * candidate.distance.own;
+  };
+  const double typical = std::max(model.objects[best.object].typical_distance, least_distance);
+  return 0.5 * model.decision.tuning.effective_dimensions * (squared(second) - squared(best)) /
+         (typical * typical);
+}
+
+/// The evidence for an object as if none of the others resembled the region.
+double evidence_without_rival(const Model& model, const WholeCandidate& candidate) {
+  const WholeMatch whole{candidate.distance.own, model.objects[candidate.object].typical_distance};
+  WindowsMatch windows = candidate.windows;
+  windows.next.reset();
+  return evidence_of(model.decision.weights, whole, windows);
 }
 
 }  // namespace
+
+WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDistance& distance) {
+  WholeMatch match{distance.own, model.objects[object].typical_distance};
+  if (distance.other) match.other = distance.other->distance;
+  return match;
+}
+
+WholeCandidates compare_whole(const Model& model, const PartsRecognizer::Look& look,
+                              const PartsRecognizer::Votes& votes, AlignedMatch& match,
+                              const WholeRegion& region) {
+  WholeCandidates candidates;
+  const auto add = [&](std::size_t object) {
+    if (std::ranges::find(candidates, object, &WholeCandidate::object) != candidates.end()) return;
+    WholeCandidate candidate;
+    candidate.object = object;
+    candidate.misalignment = match.align(look.pose_picture(), object).front().misalignment;
+    candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
+    candidate.windows = votes.match(object);
+    candidate.evidence = evidence_of(model.decision.weights, whole_match(model, object, candidate.distance),
+                                     candidate.windows);
+    candidates.push_back(candidate);
+  };
+  add(region.nearest);
+  const auto ranked = votes.ranked();
+  for (std::size_t i = 0; i < std::min(most_voted, ranked.size()); ++i)
+    if (ranked[i].score > 0.0F && ranked[i].object != region.absent) add(ranked[i].object);
+  insertion_sort(candidates,
+                 [](const WholeCandidate& a, const WholeCandidate& b) { return a.evidence > b.evidence; });
+  if (candidates.size() > 1 && tied(model.decision, candidates[0], candidates[1]) &&
+      candidates[1].distance.own < candidates[0].distance.own)
+    std::swap(candidates[0], candidates[1]);
+  return candidates;
+}
+
+std::optional<PartsIdentification> identify_if_occluded(const Model& model,
+                                                        const PartsRecognizer::Votes& votes) {
+  const std::size_t first = votes.ranked().front().object;
+  const double occluded = votes.occluded_share(first);
+  const Tuning& tuning = model.decision.tuning;
+  if (occluded <= model.parts->calibration[first].foreign_share || occluded > tuning.most_occluded)
+    return std::nullopt;
+  PartsIdentification found = votes.identify_occluded();
+  if (votes.gain_of_masking(found.best) < tuning.least_masking_gain) return std::nullopt;
+  return found;
+}
 
 PartsStage::PartsStage(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
                        HypothesisPool& pool)
     : model_(model),
       pool_(pool),
-      recognizer_(*model.parts),
-      match_(model, all, separate, reach_of_others(model)),
-      touching_(model.normalization, *model.parts, recognizer_),
+      recognizer_(*model.parts, model.decision),
+      match_(model, all, separate, reach_of_others),
+      touching_(model, recognizer_),
       picture_(model.normalization.size, model.normalization.size,
                picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
-
-bool PartsStage::accepted(const PartsIdentification& found, const RealignedDistance& distance) const {
-  const PartsAnswer& best = found.best;
-  const PartsCalibration& calibration = model_.parts->calibration[best.object];
-  if (distance.own <= calibration.sure_distance) return true;
-  if (distance.own <= calibration.rejection_distance && best.score <= calibration.rejection_score)
-    return true;
-  return best.occluded > calibration.covered_share && best.occluded <= max_occluded_share &&
-         found.evidence > model_.parts->covered_evidence;
-}
 
 bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<const double> b) const {
   const Workspace& workspace = model_.objects[object].workspace;
@@ -57,124 +109,123 @@ bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<
 std::size_t PartsStage::judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome) {
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   const PartsRecognizer::Look look = recognizer_.look(picture_);
-  return settle(look, picture, nearest, outcome) ? nearest : vote(look, picture, outcome);
+  return settle(look, picture, nearest, outcome) ? nearest : vote(look, picture, nearest, outcome);
 }
 
 bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t object,
                         Outcome& outcome) {
-  const PartsCalibration& calibration = model_.parts->calibration[object];
+  const DecisionModel& decision = model_.decision;
   const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), object);
   Finding finding;
   finding.object = object;
-  finding.distance = match_.distance(picture, aligned.front().misalignment, object);
-  const double own = finding.distance.own;
-  if (own > calibration.sure_distance) return false;
-  if (const auto& other = finding.distance.other;
-      other && own * own > model_.parts->sure_ratio * other->distance * other->distance)
-    return false;
+  finding.distance = match_.distance(picture, aligned.front().misalignment, {object});
+  finding.evidence = evidence_of(decision.weights, whole_match(model_, object, finding.distance));
+  if (finding.evidence < decision.settled) return false;
+  if (const auto& other = finding.distance.other)
+    finding.second_evidence = evidence_of(
+        decision.weights, WholeMatch{other->distance, model_.objects[other->manifold].typical_distance});
+  if (finding.second_evidence > finding.evidence - decision.tuning.settled_lead) return false;
   poses_.clear();
   bool clear = true;
   for (const AlignedPose& found : aligned) {
-    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
-                   0.0};
+    PartsPose pose{
+        found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0, 0.0, 0.0};
     pose.merit = -0.5 * pose.cost / model_.parts->noise;
     if (!poses_.empty() && apart(object, pose.q, poses_.front().q))
-      clear = clear && pose.merit < poses_.front().merit - sure_pose;
+      clear = clear && pose.merit < poses_.front().merit - decision.tuning.settled_pose_lead;
     poses_.push_back(pose);
   }
-  if (clear) {
-    finding.poses = poses_;
-    describe(finding, true, outcome);
-    return true;
+  finding.poses = poses_;
+  PartsAnswer answer;
+  if (!clear) {
+    // The object is certain, its pose is not: the windows decide.
+    answer = look.vote({&object, 1}).settle(object);
+    if (answer.occluded > model_.parts->calibration[object].foreign_share) return false;
+    finding.poses = answer.poses;
   }
-  // The object is certain, its pose is not: the windows decide.
-  const PartsAnswer answer = look.vote({&object, 1}).settle(object);
-  if (answer.occluded > calibration.covered_share) return false;
-  finding.poses = answer.poses;
-  describe(finding, true, outcome);
+  describe(finding, outcome);
   return true;
 }
 
-RealignedDistance PartsStage::distance_of(std::span<const float> picture, const PartsAnswer& answer) {
-  return match_.distance(picture, answer.poses.front().misalignment, answer.object);
-}
-
 std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const float> picture,
-                             Outcome& outcome) {
-  PartsIdentification found = look.identify();
-  RealignedDistance distance = distance_of(picture, found.best);
-  if (found.tie && found.best.occluded <= model_.parts->calibration[found.best.object].covered_share) {
-    // The windows cannot distinguish the two; the whole region, aligned with each, may.
-    RealignedDistance second = distance_of(picture, *found.second);
-    if (second.own < distance.own) {
-      std::swap(found.best, *found.second);
-      std::swap(distance, second);
+                             std::size_t nearest, Outcome& outcome) {
+  const PartsRecognizer::Votes votes = look.vote();
+  const WholeCandidates candidates = compare_whole(model_, look, votes, match_, {picture, nearest, {}});
+  const WholeCandidate& best = candidates.front();
+  if (best.evidence < model_.decision.required) {
+    const auto found = identify_if_occluded(model_, votes);
+    if (found && found->evidence > best.evidence) {
+      describe_occluded(*found, picture, outcome);
+      return found->best.object;
     }
-    found.tie =
-        is_ambiguous(likelihood(second.own, distance.own, model_.typical_distance(found.best.object)));
   }
-  describe(found, distance, accepted(found, distance), picture, outcome);
-  return found.best.object;
+  const PartsAnswer answer = votes.settle(best.object);
+  Finding finding;
+  finding.object = best.object;
+  finding.poses = answer.poses;
+  finding.distance = best.distance;
+  finding.occluded = answer.occluded;
+  finding.evidence = best.evidence;
+  if (candidates.size() > 1) {
+    const double lead = lead_of(model_, best, candidates[1]);
+    // That it is one of two is not in doubt because they are alike.
+    if (lead < model_.decision.tuning.ambiguous_lead)
+      finding.evidence = std::max(best.evidence, evidence_without_rival(model_, best));
+    finding.second_evidence = finding.evidence - lead;
+  }
+  describe(finding, outcome);
+  if (candidates.size() > 1) {
+    const WholeCandidate& second = candidates[1];
+    pool_.fill(outcome.runner_up, model_.objects[second.object].name,
+               match_.align(look.pose_picture(), second.object).front().q, second.distance.own);
+  }
+  return best.object;
 }
 
 void PartsStage::describe(const TouchingObject& object, Outcome& outcome) {
-  describe(object.found, distance_of(object.picture, object.found.best), true, object.picture, outcome);
+  describe_occluded(object.found, object.picture, outcome);
+  // Whether it is accepted was decided with the others of its region.
+  if (outcome.verdict == Verdict::unknown) outcome.verdict = Verdict::recognized;
 }
 
-void PartsStage::describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
-                          std::span<const float> picture, Outcome& outcome) {
+void PartsStage::describe_occluded(const PartsIdentification& found, std::span<const float> picture,
+                                   Outcome& outcome) {
+  const auto distance_of = [&](const PartsAnswer& answer) {
+    return match_.distance(picture, answer.poses.front().misalignment, {answer.object});
+  };
   Finding finding;
   finding.object = found.best.object;
   finding.poses = found.best.poses;
-  finding.distance = distance;
+  finding.distance = distance_of(found.best);
   finding.occluded = found.best.occluded;
-  finding.runner_up_share = found.second_share;
-  finding.tie = found.tie;
-  const PartsCalibration& calibration = model_.parts->calibration[finding.object];
-  const double beyond =
-      distance.own <= calibration.rejection_distance
-          ? likelihood(calibration.rejection_distance, distance.own, calibration.typical_distance)
-          : std::exp(model_.parts->covered_evidence - found.evidence);
-  finding.margin = 1.0 / (1.0 + beyond);
-  describe(finding, accepted, outcome);
-  if (found.second) {
+  finding.evidence = found.evidence;
+  finding.second_evidence = found.second_evidence;
+  describe(finding, outcome);
+  if (found.second)
     pool_.fill(outcome.runner_up, model_.objects[found.second->object].name, found.second->poses.front().q,
-               distance_of(picture, *found.second).own);
-  }
+               distance_of(*found.second).own);
 }
 
-void PartsStage::describe(const Finding& finding, bool accepted, Outcome& outcome) {
+void PartsStage::describe(const Finding& finding, Outcome& outcome) {
+  const DecisionModel& decision = model_.decision;
   const ModelObject& object = model_.objects[finding.object];
-  const PartsCalibration& calibration = model_.parts->calibration[finding.object];
   const PartsPose& best = finding.poses.front();
   pool_.fill(outcome.best, object.name, best.q, finding.distance.own);
-  outcome.rejection_distance = calibration.rejection_distance;
+  outcome.evidence = finding.evidence;
+  outcome.required_evidence = decision.required;
+  outcome.confidence = confidence_of(finding.evidence, finding.second_evidence);
   outcome.covered_share = finding.occluded;
-  outcome.set_covariance(best.q_covariance, sigma_inflation * sigma_inflation, object.dof_observable);
+  outcome.set_covariance(best.q_covariance, decision.tuning.sigma_inflation * decision.tuning.sigma_inflation,
+                         object.dof_observable);
   if (const auto& other = finding.distance.other) {
     const ModelObject& second = model_.objects[other->manifold];
     pool_.fill(outcome.runner_up, second.name, std::span(other->q).first(second.workspace.size()),
                other->distance);
   }
-  if (!accepted) {
-    outcome.verdict = Verdict::unknown;
-    outcome.confidence = 0.0;
-    return;
-  }
-  outcome.verdict = finding.tie ? Verdict::ambiguous : Verdict::recognized;
-  if (finding.runner_up_share > 0.0) {
-    outcome.confidence =
-        finding.margin *
-        std::clamp((1.0 - finding.occluded) * (1.0 - 0.5 * finding.runner_up_share), 0.0, 1.0);
-  } else {
-    const auto beside = [&](double distance) {
-      return likelihood(distance, finding.distance.own, calibration.typical_distance);
-    };
-    const double second = finding.distance.other ? beside(finding.distance.other->distance) : 0.0;
-    outcome.confidence = 1.0 / (1.0 + second + beside(calibration.rejection_distance));
-  }
+  outcome.verdict = verdict_of(decision, finding.evidence, finding.second_evidence);
+  if (outcome.verdict == Verdict::unknown) return;
   for (const PartsPose& pose : finding.poses.subspan(1)) {
-    if (pose.merit > best.merit - likely_pose && apart(finding.object, pose.q, best.q)) {
+    if (pose.merit > best.merit - decision.tuning.pose_lead && apart(finding.object, pose.q, best.q)) {
       pool_.fill(outcome.other_pose, object.name, pose.q, finding.distance.own);
       break;
     }

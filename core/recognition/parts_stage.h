@@ -1,14 +1,17 @@
 #pragma once
 
-/// The second stage of recognition: alignment of the whole region and, where the aligned distance leaves a
-/// doubt, partial matching, turned into an outcome.
+/// Recognition of one region with windows: alignment of the whole region, then partial matching where that
+/// leaves a doubt, then the decision.
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "core/base/bounded_vector.h"
 #include "core/model/model.h"
 #include "core/recognition/aligned_match.h"
 #include "core/recognition/outcome.h"
@@ -17,6 +20,18 @@
 #include "core/search/search.h"
 
 namespace eigenpose {
+
+/// One object that a region may show, compared with all of it.
+struct WholeCandidate {
+  std::size_t object = 0;
+  Misalignment misalignment;  ///< of its best pose
+  RealignedDistance distance;
+  WindowsMatch windows;
+  double evidence = -std::numeric_limits<double>::infinity();
+};
+
+/// The candidates of one region, most evidence first.
+using WholeCandidates = BoundedVector<WholeCandidate, 3>;
 
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
@@ -43,28 +58,25 @@ class PartsStage {
   void describe(const TouchingObject& object, Outcome& outcome);
 
  private:
-  /// One pose of one object, wherever it was found.
+  /// What is said of a region.
   struct Finding {
     std::size_t object = 0;
-    std::span<const PartsPose> poses;
+    std::span<const PartsPose> poses;  ///< of the object, best first
     RealignedDistance distance;
     double occluded = 0.0;
-    double runner_up_share = 0.0;  ///< of votes; 0 where the whole region decided
-    double margin = 1.0;           ///< 1/(1 + L) of the rejection threshold: ½ there, → 1 far within
-    bool tie = false;
+    double evidence = 0.0;
+    double second_evidence = -std::numeric_limits<double>::infinity();
   };
 
-  /// Decides by the whole region alone. True when it left no doubt, and `outcome` is filled.
+  /// The decision by the whole region alone; nothing where it leaves a doubt.
   bool settle(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t object,
               Outcome& outcome);
   /// Decides by the windows as well. @return the object.
-  std::size_t vote(const PartsRecognizer::Look& look, std::span<const float> picture, Outcome& outcome);
-  void describe(const PartsIdentification& found, const RealignedDistance& distance, bool accepted,
-                std::span<const float> picture, Outcome& outcome);
-  void describe(const Finding& finding, bool accepted, Outcome& outcome);
-  /// Distance of the region with the misalignment of the answer's best pose undone.
-  RealignedDistance distance_of(std::span<const float> picture, const PartsAnswer& answer);
-  [[nodiscard]] bool accepted(const PartsIdentification& found, const RealignedDistance& distance) const;
+  std::size_t vote(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t nearest,
+                   Outcome& outcome);
+  /// Fills everything of `outcome` but its box.
+  void describe(const Finding& finding, Outcome& outcome);
+  void describe_occluded(const PartsIdentification& found, std::span<const float> picture, Outcome& outcome);
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 
   const Model& model_;
@@ -75,5 +87,26 @@ class PartsStage {
   cv::Mat picture_;
   std::vector<PartsPose> poses_;
 };
+
+/// A region as the whole-region match takes it.
+struct WholeRegion {
+  std::span<const float> picture;     ///< as the normaliser makes it
+  std::size_t nearest = 0;            ///< the object whose manifold is nearest, without alignment
+  std::optional<std::size_t> absent;  ///< an object that counts as not learned
+};
+
+/// The objects that a region may show as a whole: the nearest, and those with most votes; aligned, compared
+/// and sorted by evidence.
+WholeCandidates compare_whole(const Model& model, const PartsRecognizer::Look& look,
+                              const PartsRecognizer::Votes& votes, AlignedMatch& match,
+                              const WholeRegion& region);
+
+/// The object of a region that may be partly occluded: some windows of the object with most votes are
+/// foreign, not too many, and masking explains the region much better. Nothing otherwise.
+std::optional<PartsIdentification> identify_if_occluded(const Model& model,
+                                                        const PartsRecognizer::Votes& votes);
+
+/// What the decision weighs of a distance.
+WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDistance& distance);
 
 }  // namespace eigenpose

@@ -10,7 +10,6 @@
 #include "core/image/normalization.h"
 #include "core/image/segmentation.h"
 #include "core/recognition/decision.h"
-#include "core/recognition/likelihood.h"
 #include "core/recognition/manifold_samples.h"
 #include "core/recognition/object_eigenspace_index.h"
 #include "core/recognition/parts_stage.h"
@@ -23,7 +22,7 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock;
 
-/// How far beyond the largest rejection distance the search looks for the runner-up.
+/// How far beyond the farthest accepted distance the search looks for the runner-up.
 constexpr double search_reach = 1.5;
 /// Where the second best object is nearer than this times the best, the objects' own eigenspaces decide.
 constexpr double second_look_ratio = 2.0;
@@ -142,8 +141,10 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
   poses.reserve(manifolds.size());
   for (const Manifold& manifold : manifolds) poses.emplace_back(manifold);
   for (const ModelObject& object : model->objects)
-    search_bound = std::max(search_bound, search_reach * object.rejection_distance);
-  if (options.rejector && search_bound > 0.0)
+    search_bound = std::max(
+        search_bound,
+        search_reach * model->decision.distance_of(model->decision.required, object.typical_distance));
+  if (options.rejector && search_bound > 0.0 && std::isfinite(search_bound))
     rejector = std::make_unique<RejectionSearch>(manifolds, RejectorOptions{.distance = search_bound});
   if (model->parts) parts.emplace(*model, *search, separate, pool);
 }
@@ -225,27 +226,26 @@ void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region,
 
 void Recognizer::Impl::judge(Outcome& outcome) {
   const ClosestPoint& best = closest[0];
-  const ModelObject& object = model->objects[best.manifold];
-  describe(outcome.best, best);
-  outcome.rejection_distance = object.rejection_distance;
-  if (closest_count > 1) describe(outcome.runner_up, closest[1]);
-  if (best.distance > object.rejection_distance) {
-    outcome.verdict = Verdict::unknown;
-    return;
-  }
-  outcome.verdict = Verdict::recognized;
-  const auto beside = [&](double distance) {
-    return likelihood(distance, best.distance, object.typical_distance);
+  const DecisionModel& decision = model->decision;
+  const auto evidence_at = [&](double distance, std::size_t object) {
+    return evidence_of(decision.weights, WholeMatch{distance, model->objects[object].typical_distance});
   };
-  const double second = closest_count > 1 ? beside(closest[1].distance) : 0.0;
-  if (is_ambiguous(second)) outcome.verdict = Verdict::ambiguous;
-  outcome.confidence = 1.0 / (1.0 + second + beside(object.rejection_distance));
+  describe(outcome.best, best);
+  if (closest_count > 1) describe(outcome.runner_up, closest[1]);
+  outcome.evidence = evidence_at(best.distance, best.manifold);
+  outcome.required_evidence = decision.required;
+  const double second = closest_count > 1 ? evidence_at(closest[1].distance, closest[1].manifold)
+                                          : -std::numeric_limits<double>::infinity();
+  outcome.confidence = confidence_of(outcome.evidence, second);
+  outcome.verdict = verdict_of(decision, outcome.evidence, second);
+  if (outcome.verdict == Verdict::unknown) return;
   estimate_pose(outcome, best);
+  const ModelObject& object = model->objects[best.manifold];
   const std::span<double> q(other_q.data(), object.workspace.size());
   const auto other = poses[best.manifold].other_minimum(point, outcome.best->q, poses_apart, q);
-  if (other && is_ambiguous(beside(std::max(best.distance, other->distance)))) {
+  if (other &&
+      evidence_at(other->distance, best.manifold) > outcome.evidence - decision.tuning.ambiguous_lead)
     pool.fill(outcome.other_pose, object.name, q, other->distance);
-  }
 }
 
 void Recognizer::Impl::split(const cv::Mat& image, std::size_t region, const RecognitionLimits& limits) {
@@ -272,7 +272,8 @@ void Recognizer::Impl::split(const cv::Mat& image, std::size_t region, const Rec
 
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
   const ModelObject& object = model->objects[best.manifold];
-  const double sigma = std::max(best.distance, object.typical_distance) / std::sqrt(effective_dimensions);
+  const double sigma = std::max(best.distance, object.typical_distance) /
+                       std::sqrt(model->decision.tuning.effective_dimensions);
   outcome.set_covariance(poses[best.manifold].covariance(outcome.best->q), sigma * sigma,
                          object.dof_observable);
 }

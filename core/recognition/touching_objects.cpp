@@ -37,11 +37,11 @@ constexpr double least_explained = 0.85;
 constexpr double plainly_explained = 0.97;  ///< no other first object is tried
 /// Remains of neighbouring objects lower the evidence, fully during the search and partly after they have
 /// been removed.
-constexpr double search_slack = 3.0;
+constexpr double search_slack = 6.0;
 constexpr double most_overlapped = 0.25;  ///< share of an object that others may hide; unknown ones hide more
 constexpr double most_left_over = 0.1;    ///< an object occluded by more than this gets no slack in the end
-constexpr double final_slack = 1.5;
-constexpr double beyond_doubt = 1.5;  ///< evidence above the threshold
+constexpr double final_slack = 3.0;
+constexpr double beyond_doubt = 1.0;  ///< evidence above the threshold
 /// A known object in a region this many times larger than it was learned may be two.
 constexpr double doubtful_size = 1.3;
 constexpr double silhouette_level = 0.2;  ///< of the root mean square brightness of an object's picture
@@ -114,15 +114,15 @@ void keep_different(std::vector<TouchingObject>& objects) {
 
 }  // namespace
 
-TouchingObjects::TouchingObjects(const NormalizationOptions& normalization, const PartsModel& parts,
-                                 PartsRecognizer& recognizer)
-    : normalization_(normalization),
-      parts_(parts),
+TouchingObjects::TouchingObjects(const Model& model, PartsRecognizer& recognizer)
+    : normalization_(model.normalization),
+      parts_(*model.parts),
+      decision_(model.decision),
       recognizer_(recognizer),
-      normalizer_(normalization),
+      normalizer_(model.normalization),
       least_(std::numeric_limits<int>::max(), std::numeric_limits<int>::max()),
-      picture_(normalization.size, normalization.size,
-               picture_bands(normalization) == 3 ? CV_8UC3 : CV_8UC1) {
+      picture_(model.normalization.size, model.normalization.size,
+               picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {
   for (double same = same_extent; extents_.empty() || extents_.size() > most_extents; same *= 1.3) {
     extents_.clear();
     group_extents(same);
@@ -208,9 +208,9 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
         if (!seen) continue;
         const PartsRecognizer::Votes votes = seen->vote(extents_[e].objects);
         const std::size_t object = votes.ranked()[0].object;
-        const double share = votes.share_of(object);
-        const double own = 1.0 - parts_.calibration[object].rejection_score;
-        if (share >= least_trial_votes * visible * own) all.push_back({box, e, share});
+        const WindowsMatch match = votes.match(object);
+        if (match.votes >= least_trial_votes * visible * match.typical_votes)
+          all.push_back({box, e, match.votes});
       }
     }
   }
@@ -225,7 +225,7 @@ TouchingObject TouchingObjects::settle(const cv::Rect& box, std::span<const std:
   TouchingObject object{box, {}, {}};
   const auto seen = look(box, object.picture);
   if (!seen) return object;
-  object.found = seen->identify(shortlist, Occlusion::assumed);
+  object.found = seen->vote(shortlist).identify_occluded();
   const PartsPose& pose = object.found.best.poses.front();
   // The size of the learned view, about the middle corrected by the misalignment.
   const cv::Size learned = learned_size(object.found.best.object, pose.q);
@@ -266,7 +266,7 @@ std::vector<TouchingObject> TouchingObjects::candidates(std::span<const Trial> t
       object = std::move(again);
   }
   std::erase_if(found, [&](const TouchingObject& object) {
-    return !(object.found.evidence > parts_.covered_evidence - search_slack);
+    return !(object.found.evidence > decision_.required - search_slack);
   });
   std::ranges::sort(found, by_evidence);
   keep_different(found);
@@ -346,8 +346,8 @@ void TouchingObjects::match_again(const cv::Mat& cut) {
     TouchingObject again = settle(objects[i].box, std::span(&objects[i].found.best.object, 1));
     if (again.found.best.poses.empty()) continue;
     again.found.second = objects[i].found.second;
-    again.found.second_share = objects[i].found.second_share;
-    again.found.tie = objects[i].found.tie;
+    again.found.second_evidence =
+        again.found.evidence - (objects[i].found.evidence - objects[i].found.second_evidence);
     objects[i] = std::move(again);
   }
 }
@@ -356,7 +356,7 @@ void TouchingObjects::accept(double explained) {
   std::vector<TouchingObject>& objects = result_.objects;
   const auto sure = [&](const TouchingObject& object, double slack) {
     return object.found.best.occluded <= most_overlapped &&
-           object.found.evidence > parts_.covered_evidence - slack;
+           object.found.evidence > decision_.required - slack;
   };
   const bool all = objects.size() > 1 && explained > least_explained &&
                    std::ranges::all_of(objects, [&](const TouchingObject& object) {

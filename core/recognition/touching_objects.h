@@ -16,6 +16,7 @@
 
 #include "core/image/normalization.h"
 #include "core/image/segmentation.h"
+#include "core/model/model.h"
 #include "core/recognition/limits.h"
 #include "core/recognition/parts_recognizer.h"
 
@@ -40,9 +41,8 @@ struct SplitRegion {
 /// Splits regions of touching objects. Holds scratch memory: one thread at a time.
 class TouchingObjects {
  public:
-  /// Both outlive it. @param recognizer of the model's parts.
-  TouchingObjects(const NormalizationOptions& normalization, const PartsModel& parts,
-                  PartsRecognizer& recognizer);
+  /// @param model has parts. @param recognizer of them; both outlive it.
+  TouchingObjects(const Model& model, PartsRecognizer& recognizer);
 
   /// The object in this pose was learned so much smaller that the region may show another beside it.
   [[nodiscard]] bool too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const;
@@ -98,6 +98,7 @@ class TouchingObjects {
 
   const NormalizationOptions& normalization_;
   const PartsModel& parts_;
+  const DecisionModel& decision_;
   PartsRecognizer& recognizer_;
   Normalizer normalizer_;
   std::vector<Extent> extents_;

@@ -15,6 +15,8 @@ namespace {
 
 /// Offset of an object that was not matched.
 constexpr std::size_t absent = std::numeric_limits<std::size_t>::max();
+/// Score of what was not learned: below that of every learned window.
+constexpr std::int32_t no_score = std::numeric_limits<std::int32_t>::min();
 
 /// exp(−x) for x ≥ 0 from a table: relative error below 1 %, 0 beyond 16.
 float fast_exp_of_minus(float x) {
@@ -31,13 +33,15 @@ float fast_exp_of_minus(float x) {
   return i < 0 ? 1.0F : i < size ? table[static_cast<std::size_t>(i)] : 0.0F;
 }
 
-/// The largest of `count` scores, a multiple of eight.
-std::int32_t largest(const std::int32_t* numbers, std::size_t count) {
+/// The largest of `count` ≥ 1 scores. Eight at a time, which the compiler makes vectors of.
+std::int32_t largest(const std::int32_t* scores, std::size_t count) {
   std::array<std::int32_t, WindowStore::group> most{};
-  std::copy_n(numbers, most.size(), most.begin());
-  for (std::size_t i = most.size(); i < count; i += most.size()) {
-    for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::max(most[k], numbers[i + k]);
+  most.fill(no_score);
+  std::size_t i = 0;
+  for (; i + most.size() <= count; i += most.size()) {
+    for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::max(most[k], scores[i + k]);
   }
+  for (; i < count; ++i) most[0] = std::max(most[0], scores[i]);
   return *std::ranges::max_element(most);
 }
 
@@ -74,7 +78,7 @@ float PartialMatcher::likeness(float energy, std::int32_t score) const {
   return fast_exp_of_minus(std::max(squared, 0.0F) / (2.0F * options_.width * options_.width));
 }
 
-void PartialMatcher::score_object(std::size_t i, std::size_t object) {
+void PartialMatcher::score_object(std::size_t object) {
   const PartsObject& parts = objects_[object];
   parts.store.best_scores(placed_, lanes_.data());
   const std::size_t lanes = parts.store.groups() * WindowStore::group;
@@ -85,15 +89,28 @@ void PartialMatcher::score_object(std::size_t i, std::size_t object) {
     if (one_lane_each_[object]) {
       std::copy_n(lane_scores, candidates, out);
     } else {
-      std::fill_n(out, candidates, std::numeric_limits<std::int32_t>::min());
+      std::fill_n(out, candidates, no_score);
       for (std::size_t lane = 0; lane < parts.lane_candidate.size(); ++lane) {
         std::int32_t& best = out[parts.lane_candidate[lane]];
         best = std::max(best, lane_scores[lane]);
       }
     }
-    // Lanes that hold no view score far below all others.
-    bests_[w * shortlist_.size() + i] = largest(lane_scores, lanes);
   }
+}
+
+void PartialMatcher::find_bests(std::size_t i) {
+  const std::size_t candidates = objects_[shortlist_[i]].candidates.size();
+  for (std::size_t w = 0; w < query_->windows.size(); ++w) {
+    const std::int32_t* scores = scores_.data() + w * row_length_ + offsets_[shortlist_[i]];
+    bests_[w * shortlist_.size() + i] = largest(scores, candidates);
+  }
+}
+
+void PartialMatcher::readmit() {
+  if (excluded_.empty()) return;
+  for (const auto& [place, score] : excluded_) scores_[place] = score;
+  excluded_.clear();
+  find_bests(excluded_of_);
 }
 
 std::int32_t PartialMatcher::find_background(std::size_t window) {
@@ -125,7 +142,8 @@ void PartialMatcher::add_votes(std::size_t window, std::size_t i) {
 std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
                                                    std::span<const std::size_t> shortlist) {
   query_ = &query;
-  shortlist_ = shortlist;
+  shortlist_.assign(shortlist.begin(), shortlist.end());
+  excluded_.clear();
   offsets_.assign(objects_.size(), absent);
   row_length_ = 0;
   std::size_t most_lanes = 0;
@@ -137,20 +155,42 @@ std::span<const PartialVote> PartialMatcher::match(const QueryWindows& query,
   const std::size_t count = query.windows.size();
   scores_.resize(count * row_length_);
   lanes_.resize(count * most_lanes);
-  bests_.resize(count * shortlist.size());
+  bests_.resize(count * shortlist_.size());
   placed_.place(query.windows, QueryWindows::stride, options_.tolerance, scale_);
-  for (std::size_t i = 0; i < shortlist.size(); ++i) score_object(i, shortlist[i]);
+  for (std::size_t i = 0; i < shortlist_.size(); ++i) {
+    score_object(shortlist_[i]);
+    find_bests(i);
+  }
+  return count_votes();
+}
 
+std::span<const PartialVote> PartialMatcher::match_without(std::size_t object,
+                                                           std::span<const int> candidates) {
+  const std::size_t offset = offset_of(object);
+  readmit();
+  excluded_of_ = static_cast<std::size_t>(std::ranges::find(shortlist_, object) - shortlist_.begin());
+  for (std::size_t w = 0; w < query_->windows.size(); ++w)
+    for (const int candidate : candidates) {
+      const std::size_t place = w * row_length_ + offset + static_cast<std::size_t>(candidate);
+      excluded_.emplace_back(place, scores_[place]);
+      scores_[place] = no_score;
+    }
+  find_bests(excluded_of_);
+  return count_votes();
+}
+
+std::span<const PartialVote> PartialMatcher::count_votes() {
+  const std::size_t count = query_->windows.size();
   votes_.assign(row_length_, 0.0F);
   background_.assign(count, 0.0F);
   for (std::size_t w = 0; w < count; ++w) {
     const std::int32_t floor = find_background(w);
-    for (std::size_t i = 0; i < shortlist.size(); ++i)
-      if (bests_[w * shortlist.size() + i] > floor) add_votes(w, i);
+    for (std::size_t i = 0; i < shortlist_.size(); ++i)
+      if (bests_[w * shortlist_.size() + i] > floor) add_votes(w, i);
   }
 
   result_.clear();
-  for (const std::size_t o : shortlist) {
+  for (const std::size_t o : shortlist_) {
     const float* votes = votes_.data() + offsets_[o];
     const float* best = std::max_element(votes, votes + objects_[o].candidates.size());
     result_.push_back({o, *best, static_cast<int>(best - votes)});

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/windows/window_store.h"
@@ -71,6 +72,11 @@ class PartialMatcher {
   /// call, as long as the query stays. @pre the shortlist is not empty.
   std::span<const PartialVote> match(const QueryWindows& query, std::span<const std::size_t> shortlist);
 
+  /// The same votes once more, as if some candidates of one object had not been learned. They stay excluded
+  /// until the next call of either function. @throws std::invalid_argument for an object that was not on the
+  /// shortlist of the last match.
+  std::span<const PartialVote> match_without(std::size_t object, std::span<const int> candidates);
+
   /// Votes of the query matched last for each candidate of one object, without background and pooling.
   /// @throws std::invalid_argument for an object that was not on its shortlist.
   void plain_votes(std::size_t object, std::vector<float>& votes) const;
@@ -82,7 +88,13 @@ class PartialMatcher {
  private:
   [[nodiscard]] float likeness(float energy, std::int32_t score) const;
   /// Scores of all windows for the candidates of the shortlist's i-th object.
-  void score_object(std::size_t i, std::size_t object);
+  void score_object(std::size_t object);
+  /// The best score of each window for the shortlist's i-th object.
+  void find_bests(std::size_t i);
+  /// Votes of all windows, from their scores.
+  std::span<const PartialVote> count_votes();
+  /// Gives the candidates that are excluded their scores back.
+  void readmit();
   /// The background score of one window, and its κ; no votes at or below that score.
   std::int32_t find_background(std::size_t window);
   /// Adds the votes of one window for the shortlist's i-th object.
@@ -95,14 +107,17 @@ class PartialMatcher {
   VotingOptions options_;
   std::vector<bool> one_lane_each_;  ///< objects whose candidates are their lanes
   const QueryWindows* query_ = nullptr;
-  std::span<const std::size_t> shortlist_;  ///< within match
-  std::vector<std::size_t> offsets_;        ///< object → its first candidate in a row of scores_
+  std::vector<std::size_t> shortlist_;  ///< of the last match
+  std::vector<std::size_t> offsets_;    ///< object → its first candidate in a row of scores_
   std::size_t row_length_ = 0;
   std::vector<std::int32_t> scores_;  ///< [81][candidates of the shortlist's objects]
   PlacedQueries placed_;
   std::vector<std::int32_t> lanes_;  ///< [81][lanes of an object]
   std::vector<std::int32_t> bests_;  ///< [81][shortlist]
-  std::vector<float> background_;    ///< [81] κ of the background
+  /// Scores of the excluded candidates, and where they belong.
+  std::vector<std::pair<std::size_t, std::int32_t>> excluded_;
+  std::size_t excluded_of_ = 0;    ///< place of their object on the shortlist
+  std::vector<float> background_;  ///< [81] κ of the background
   std::vector<float> votes_;
   std::vector<std::int32_t> sorted_;  ///< best scores at one window
   std::vector<float> kappas_;         ///< of one object's candidates at one window

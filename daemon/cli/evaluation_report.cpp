@@ -86,7 +86,7 @@ void add_times_json(const EvaluationReport& report, json& result) {
   result["times_ms"] = {{"normalize", milliseconds(report.learning.normalize_time)},
                         {"eigenspace", milliseconds(report.learning.eigenspace_time)},
                         {"manifolds", milliseconds(report.learning.manifold_time)},
-                        {"rejection", milliseconds(report.learning.rejection_time)},
+                        {"calibration", milliseconds(report.learning.calibration_time)},
                         {"learning", milliseconds(report.learning.total_time)}};
   const std::size_t n = report.counts.known;
   result["times_us_per_view"] = {{"load", micro_per_view(report.load_time, n)},
@@ -142,10 +142,10 @@ void print_scenes(const SceneReport& scenes) {
 }
 
 void print_times(const EvaluationReport& report) {
-  std::printf("learning    %.0f ms: normalise %.0f, eigenspace %.0f, manifolds %.0f, rejection %.0f\n",
+  std::printf("learning    %.0f ms: normalise %.0f, eigenspace %.0f, manifolds %.0f, calibration %.0f\n",
               milliseconds(report.learning.total_time), milliseconds(report.learning.normalize_time),
               milliseconds(report.learning.eigenspace_time), milliseconds(report.learning.manifold_time),
-              milliseconds(report.learning.rejection_time));
+              milliseconds(report.learning.calibration_time));
   const std::size_t views = report.counts.known;
   std::printf(
       "a view      %.0f µs: segment %.0f, normalise %.0f, project %.0f, search %.0f (reading the file: "

@@ -1,5 +1,6 @@
 /// `eigenpose inspect`: what a model file holds.
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -32,6 +33,38 @@ struct InspectOptions {
   bool as_json = false;
 };
 
+/// Thresholds at which the curve is shown: the one in use, and nine along the evidence of all probes.
+std::vector<double> curve_points(const DecisionModel& decision) {
+  std::vector<double> all = decision.known;
+  all.insert(all.end(), decision.unknown.begin(), decision.unknown.end());
+  std::ranges::sort(all);
+  std::vector<double> points{decision.required};
+  constexpr std::size_t shown = 9;
+  for (std::size_t i = 0; !all.empty() && i < shown; ++i)
+    points.push_back(all[i * (all.size() - 1) / (shown - 1)]);
+  std::ranges::sort(points);
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  return points;
+}
+
+json decision_json(const DecisionModel& decision) {
+  const auto rates = [](const DecisionRates& some) {
+    return json{{"false_rejection", some.false_rejection}, {"false_acceptance", some.false_acceptance}};
+  };
+  json curve = json::array();
+  for (const double required : curve_points(decision)) {
+    json point = rates(rates_at(decision, required));
+    point["evidence"] = required;
+    curve.push_back(std::move(point));
+  }
+  return {{"required_evidence", decision.required},
+          {"settled_evidence", decision.settled},
+          {"set", rates(decision.set)},
+          {"expected", rates(decision.expected)},
+          {"smallest_rate", decision.smallest_rate()},
+          {"curve", curve}};
+}
+
 json to_json(const Model& model) {
   json objects = json::array();
   for (std::size_t o = 0; o < model.objects.size(); ++o) {
@@ -50,7 +83,7 @@ json to_json(const Model& model) {
     objects.push_back({{"name", object.name},
                        {"views", object.views},
                        {"rejection_distance", model.rejection_distance(o)},
-                       {"typical_distance", model.typical_distance(o)},
+                       {"typical_distance", model.objects[o].typical_distance},
                        {"bytes", model.memory(o)},
                        {"pose_observable", object.pose_observable},
                        {"spline_degree", object.manifold.degree()},
@@ -72,7 +105,19 @@ json to_json(const Model& model) {
             {"solver", model.provenance.solver},
             {"energy", model.provenance.energy},
             {"energy_bound", model.provenance.energy_bound}}},
+          {"decision", decision_json(model.decision)},
           {"objects", objects}};
+}
+
+/// Both rates along the evidence that may be required; the threshold in use is marked.
+void print_curve(const DecisionModel& decision) {
+  std::printf("\n%9s %17s %18s   by %zu views as known, %zu as unknown\n", "evidence", "false rejections",
+              "false acceptances", decision.known.size(), decision.unknown.size());
+  for (const double required : curve_points(decision)) {
+    const DecisionRates rates = rates_at(decision, required);
+    std::printf("%9.1f %15.2f %% %16.2f %%%s\n", required, 100.0 * rates.false_rejection,
+                100.0 * rates.false_acceptance, required == decision.required ? "   <- required" : "");
+  }
 }
 
 void print(const Model& model) {
@@ -89,7 +134,7 @@ void print(const Model& model) {
   for (std::size_t o = 0; o < model.objects.size(); ++o) {
     const ModelObject& object = model.objects[o];
     std::printf("%-16s %6zu %18.4f %9.4f %5.2f MB  ", object.name.c_str(), object.views,
-                model.rejection_distance(o), model.typical_distance(o),
+                model.rejection_distance(o), model.objects[o].typical_distance,
                 static_cast<double>(model.memory(o)) / 1e6);
     for (std::size_t d = 0; d < object.workspace.size(); ++d) {
       const Dof& dof = object.workspace[d];
@@ -99,6 +144,7 @@ void print(const Model& model) {
     }
     std::printf("\n");
   }
+  print_curve(model.decision);
 }
 
 int run_inspect(const InspectOptions& options) {

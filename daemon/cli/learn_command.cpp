@@ -68,6 +68,21 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// What the views can support of the rates that were set.
+void print_rates(const DecisionModel& decision) {
+  const auto percent = [](double share) { return 100.0 * share; };
+  std::printf(
+      "expected: %.2f %% of known views rejected (set %.2f %%), %.2f %% of unknown objects accepted (set "
+      "%.2f %%)\n",
+      percent(decision.expected.false_rejection), percent(decision.set.false_rejection),
+      percent(decision.expected.false_acceptance), percent(decision.set.false_acceptance));
+  if (decision.gives_up_false_rejection())
+    std::printf(
+        "note: the views do not hold both rates; that of false acceptances is held. More views of each "
+        "object, or a "
+        "higher --false-acceptance, reject fewer known views\n");
+}
+
 void print(const Model& model, const LearningReport& report, const std::string& file) {
   std::printf("%-16s %6s %18s  %s\n", "object", "views", "rejection distance", "pose");
   for (std::size_t o = 0; o < model.objects.size(); ++o) {
@@ -88,6 +103,7 @@ void print(const Model& model, const LearningReport& report, const std::string& 
               model.objects.size(), report.views, seconds(report.total_time), report.solver.components,
               report.solver.solver.c_str(),
               energy_text(report.solver.energy, report.solver.energy_bound).c_str());
+  print_rates(model.decision);
   print_resemblance(model);
   std::printf("model: %s\n", printable(file).c_str());
 }

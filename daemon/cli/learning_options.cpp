@@ -202,9 +202,7 @@ std::string energy_text(double energy, double bound) {
 }
 
 void set_rates(const LearningArguments& arguments, LearningOptions& options) {
-  options.match.rate = arguments.false_rejection;
-  options.calibration.rate = arguments.false_rejection;
-  options.match.false_acceptance_rate = arguments.false_acceptance;
+  options.rates = {arguments.false_rejection, arguments.false_acceptance};
 }
 
 std::size_t memory_limit(const LearningArguments& arguments) {

@@ -27,8 +27,8 @@ struct LearningArguments {
   double memory_limit_mib = 0.0;
   std::vector<std::string> objects;
   bool strict = false;
-  double false_rejection = LearningOptions{}.match.rate;                    ///< --false-rejection
-  double false_acceptance = LearningOptions{}.match.false_acceptance_rate;  ///< --false-acceptance
+  double false_rejection = DecisionRates{}.false_rejection;    ///< --false-rejection
+  double false_acceptance = DecisionRates{}.false_acceptance;  ///< --false-acceptance
 };
 
 /// Adds --components, --energy, --size, --type, --color, --grey, --whole-region, --solver, --degree,

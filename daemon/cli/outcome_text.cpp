@@ -21,8 +21,8 @@ std::pair<std::string, std::string> name_and_unit(const std::string& key) {
 
 std::string numbers_text(const json& outcome) {
   std::string text =
-      fmt::format("distance {:.2f}, limit {:.2f}, confidence {:.2f}", outcome.at("distance").get<double>(),
-                  outcome.at("rejection_distance").get<double>(), outcome.at("confidence").get<double>());
+      fmt::format("evidence {:.1f} of {:.1f}, confidence {:.2f}", outcome.at("evidence").get<double>(),
+                  outcome.at("required_evidence").get<double>(), outcome.at("confidence").get<double>());
   // Occlusion raises the distance: said where a person would wonder about it.
   const double occluded = outcome.value("covered_share", 0.0);
   if (occluded >= 0.05) text += fmt::format(", {:.0f} % occluded", 100.0 * occluded);
@@ -75,9 +75,9 @@ std::string outcome_text(const json& outcome) {
   if (verdict == "too_small") return "something too small to recognise";
   if (verdict == "unknown") {
     if (!has_best) return "unknown object";
-    return fmt::format("unknown object (nearest {}: distance {:.2f}, limit {:.2f})",
+    return fmt::format("unknown object (most like {}: evidence {:.1f} of {:.1f})",
                        printable(outcome.at("object").get<std::string>()),
-                       outcome.at("distance").get<double>(), outcome.at("rejection_distance").get<double>());
+                       outcome.at("evidence").get<double>(), outcome.at("required_evidence").get<double>());
   }
   if (!has_best) return printable(verdict);
   std::string text = object_at(outcome);

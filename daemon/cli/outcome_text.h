@@ -8,7 +8,7 @@
 
 namespace eigenpose::cli {
 
-/// One line without its end: "duck at 70.0° ± 0.3 (distance 0.23, limit 0.08, confidence 0.37)". A pose that
+/// One line without its end: "duck at 70.0° ± 0.3 (evidence 4.2 of 0.8, confidence 0.98)". A pose that
 /// cannot be observed is not printed as a number. @param outcome as outcome_json makes it.
 std::string outcome_text(const nlohmann::json& outcome);
 

@@ -87,7 +87,7 @@ int run(std::size_t objects) {
   bench::Series shortlist("windows of ten objects");
   bench::Series all("windows of all objects");
   Recognizer recognizer(model);
-  PartsRecognizer windows(*model->parts);
+  PartsRecognizer windows(*model->parts, model->decision);
   std::size_t recognized = 0;
   std::size_t found[2] = {0, 0};
   for (const Region& region : make_regions(objects, model->normalization)) {
@@ -102,7 +102,8 @@ int run(std::size_t objects) {
       began = bench::thread_us();
       const PartsIdentification seen =
           windows.look(region.covered)
-              .identify(among_all ? std::span<const std::size_t>() : std::span<const std::size_t>(names));
+              .vote(among_all ? std::span<const std::size_t>() : std::span<const std::size_t>(names))
+              .identify_occluded();
       (among_all ? all : shortlist).add(bench::thread_us() - began);
       const std::string& name = model->objects[seen.best.object].name;
       found[among_all ? 1 : 0] += name == "obj" + std::to_string(region.object) ? 1 : 0;

@@ -57,9 +57,8 @@ TEST(Composition, EveryKeyOfLearningAndWatchingReachesTheService) {
   EXPECT_EQ(options.learning.solver.energy, 0.5);
   EXPECT_EQ(options.learning.normalization.size, 32);
   EXPECT_FALSE(options.learning.normalization.color);
-  EXPECT_EQ(options.learning.match.rate, 0.02);
-  EXPECT_EQ(options.learning.calibration.rate, 0.02);
-  EXPECT_EQ(options.learning.match.false_acceptance_rate, 0.03);
+  EXPECT_EQ(options.learning.rates.false_rejection, 0.02);
+  EXPECT_EQ(options.learning.rates.false_acceptance, 0.03);
   EXPECT_EQ(options.learning.image_sets, "/s/sets");
   EXPECT_FALSE(options.watch.enabled);
   EXPECT_EQ(options.watch.scene.settle, std::chrono::milliseconds(123));

@@ -44,6 +44,14 @@ struct PartsWorld {
     return copy;
   }
 
+  /// The same of what decides.
+  template <typename Change>
+  [[nodiscard]] std::shared_ptr<const Model> deciding(const Change& change) const {
+    auto copy = std::make_shared<Model>(*model);
+    change(copy->decision);
+    return copy;
+  }
+
   test::TemporaryFolder folder;
   std::vector<ImageSet> sets;
   LearningReport report;

@@ -70,7 +70,8 @@ json outcome_json(const Outcome& outcome, const Model& model) {
                  {"q_sigma", sigma},
                  {"q_covariance", covariance_rows(outcome)},  // infinite values become null
                  {"distance", nullptr},
-                 {"rejection_distance", outcome.rejection_distance},
+                 {"evidence", outcome.evidence},
+                 {"required_evidence", outcome.required_evidence},
                  {"covered_share", outcome.covered_share},
                  {"confidence", outcome.confidence},
                  {"unfinished", outcome.unfinished},

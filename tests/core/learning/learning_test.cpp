@@ -63,7 +63,7 @@ TEST_F(Learning, DoesNotDependOnThreads) {
   const Model b = learn(all_views(sets), options);
   EXPECT_EQ(a.eigenspace.basis, b.eigenspace.basis);
   EXPECT_EQ(a.objects[1].manifold.coefficients(), b.objects[1].manifold.coefficients());
-  EXPECT_EQ(a.objects[1].rejection_distance, b.objects[1].rejection_distance);
+  EXPECT_EQ(a.objects[1].typical_distance, b.objects[1].typical_distance);
 }
 
 TEST_F(Learning, GivesTheSameModelFromMemoryAndFromDisk) {
@@ -83,7 +83,7 @@ TEST_F(Learning, GivesTheSameModelFromMemoryAndFromDisk) {
   const Model disk = learn(all_views(sets), options);
   EXPECT_EQ(disk.eigenspace.basis, memory.eigenspace.basis);
   EXPECT_EQ(disk.objects[1].manifold.coefficients(), memory.objects[1].manifold.coefficients());
-  EXPECT_EQ(disk.objects[1].rejection_distance, memory.objects[1].rejection_distance);
+  EXPECT_EQ(disk.objects[1].typical_distance, memory.objects[1].typical_distance);
 }
 
 TEST_F(Learning, JoinsTheEigenspacesOfItsObjects) {

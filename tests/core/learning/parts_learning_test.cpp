@@ -5,8 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
-#include "core/learning/calibration/occlusion_calibration.h"
-#include "core/learning/calibration/parts_calibration.h"
 #include "tests/support/drawn_pictures.h"
 #include "tests/support/serial_progress.h"
 
@@ -69,42 +67,18 @@ TEST(PartsLearning, AddsForeshortenedAndMirroredCopiesOfSparseViews) {
   for (std::size_t lane = 0; lane < 90; ++lane) EXPECT_EQ(object.lane_candidate[lane], lane / 3);
 }
 
-TEST(PartsLearning, DoesNotDependOnThreadsNorDoItsCalibrations) {
+TEST(PartsLearning, DoesNotDependOnThreads) {
   const auto views = turns(4, 20.0);
   std::vector<PartsModel> models;
-  std::vector<std::vector<OcclusionEvidence>> evidence;
   for (const unsigned threads : {1U, 4U}) {
     PartsLearningOptions options;
     options.threads = threads;
-    PartsModel model = learn_parts(views, options);
-    PartsCalibrationOptions calibration;
-    calibration.threads = threads;
-    calibrate_parts(model, views, calibration);
-    OcclusionCalibrationOptions occlusion;
-    occlusion.views = 20;
-    occlusion.threads = threads;
-    evidence.push_back(measure_occlusion(model, views, occlusion));
-    models.push_back(std::move(model));
+    models.push_back(learn_parts(views, options));
   }
   EXPECT_EQ(models[0].noise, models[1].noise);
-  EXPECT_EQ(models[0].smallest_rate, models[1].smallest_rate);
   for (std::size_t o = 0; o < 4; ++o) {
     EXPECT_EQ(models[0].objects[o].store.values(), models[1].objects[o].store.values());
     EXPECT_EQ(models[0].poses[o].samples(), models[1].poses[o].samples());
-    const PartsCalibration& a = models[0].calibration[o];
-    const PartsCalibration& b = models[1].calibration[o];
-    EXPECT_EQ(a.rejection_score, b.rejection_score);
-    EXPECT_EQ(a.typical_score, b.typical_score);
-    EXPECT_EQ(a.covered_share, b.covered_share);
-    EXPECT_LT(a.typical_score, a.rejection_score);
-  }
-  ASSERT_EQ(evidence[0].size(), evidence[1].size());
-  for (std::size_t i = 0; i < evidence[0].size(); ++i) {
-    EXPECT_EQ(evidence[0][i].evidence, evidence[1][i].evidence);
-    EXPECT_EQ(evidence[0][i].taken_for, evidence[1][i].taken_for);
-    if (evidence[0][i].taken_for == evidence[0][i].object) {
-      EXPECT_TRUE(std::isinf(evidence[0][i].evidence)) << "it was shown to the other objects alone";
-    }
   }
 }
 
@@ -113,14 +87,7 @@ TEST(PartsLearning, ReportsProgressOneCallAtATime) {
   test::SerialProgress heard;
   PartsLearningOptions options;
   options.threads = 4;
-  PartsModel model = learn_parts(views, options, heard.listener());
-  PartsCalibrationOptions calibration;
-  calibration.threads = 4;
-  calibrate_parts(model, views, calibration, heard.listener());
-  OcclusionCalibrationOptions occlusion;
-  occlusion.views = 40;
-  occlusion.threads = 4;
-  measure_occlusion(model, views, occlusion, heard.listener());
+  (void)learn_parts(views, options, heard.listener());
   heard.expect_complete();
 }
 
@@ -129,28 +96,11 @@ TEST(PartsLearning, EndsWhenAskedTo) {
   source.request_stop();
   const auto views = turns(2, 30.0);
   EXPECT_THROW(learn_parts(views, {}, {}, source.get_token()), Interrupted);
-  PartsModel model = learn_parts(views, {});
-  EXPECT_THROW(calibrate_parts(model, views, {}, {}, source.get_token()), Interrupted);
-  EXPECT_THROW(measure_occlusion(model, views, {}, {}, source.get_token()), Interrupted);
 }
 
 TEST(PartsLearning, RefusesObjectsWithoutViews) {
   EXPECT_THROW(learn_parts({}, {}), std::invalid_argument);
   EXPECT_THROW(learn_parts({PartsViews{}}, {}), std::invalid_argument);
-}
-
-TEST(PartsCalibration, IsStricterTheHigherTheRateOfFalseRejections) {
-  const auto views = turns(3, 20.0);
-  PartsModel model = learn_parts(views, {});
-  double before = 2.0;
-  for (const double rate : {0.0, 0.05, 0.3}) {
-    PartsCalibrationOptions options;
-    options.rate = rate;
-    calibrate_parts(model, views, options);
-    EXPECT_LT(model.calibration[1].rejection_score, before) << rate;
-    before = model.calibration[1].rejection_score;
-  }
-  EXPECT_DOUBLE_EQ(model.smallest_rate, 1.0 / (3 * 18 + 1));
 }
 
 }  // namespace

@@ -101,8 +101,7 @@ TEST_F(TrainingArchiveTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
   set_image_type(gradient.normalization, "gradient");
   LearningOptions parts = testing::small_learning();
   parts.parts = true;
-  parts.match.rate = parts.calibration.rate = 0.1;
-  parts.match.false_acceptance_rate = 0.25;
+  parts.rates = {0.1, 0.25};
   LearningOptions krylov = testing::small_learning();
   krylov.solver.solver = "krylov";
   krylov.solver.components = 3;
@@ -114,9 +113,7 @@ TEST_F(TrainingArchiveTest, HoldsForImageTypesPartsAndSolversWithoutProducts) {
     keep("kept", options);
     EXPECT_EQ(TrainingArchive(path("kept")).products().size() > 0, options.solver.solver != "krylov");
     const LearningOptions kept = TrainingArchive(path("kept")).options();
-    EXPECT_EQ(kept.match.rate, options.match.rate);
-    EXPECT_EQ(kept.calibration.rate, options.calibration.rate);
-    EXPECT_EQ(kept.match.false_acceptance_rate, options.match.false_acceptance_rate);
+    EXPECT_EQ(kept.rates, options.rates);
     std::filesystem::remove_all(sets());
     write("three", 3);
     const auto changed = updated("kept", {"one"}, open_image_sets(sets()));

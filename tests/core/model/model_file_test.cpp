@@ -56,6 +56,14 @@ TEST_F(ModelFile, GivesBackEverythingBitForBit) {
   EXPECT_EQ(after.eigenspace.total_scatter, before.eigenspace.total_scatter);
   EXPECT_EQ(after.provenance.created, before.provenance.created);
   EXPECT_EQ(after.provenance.solver, before.provenance.solver);
+  EXPECT_EQ(after.decision.weights, before.decision.weights);
+  EXPECT_EQ(after.decision.required, before.decision.required);
+  EXPECT_EQ(after.decision.settled, before.decision.settled);
+  EXPECT_EQ(after.decision.set, before.decision.set);
+  EXPECT_EQ(after.decision.expected, before.decision.expected);
+  EXPECT_EQ(after.decision.known, before.decision.known);
+  EXPECT_EQ(after.decision.unknown, before.decision.unknown);
+  EXPECT_EQ(after.decision.tuning, before.decision.tuning);
   ASSERT_EQ(after.objects.size(), before.objects.size());
   for (std::size_t i = 0; i < after.objects.size(); ++i) {
     const ModelObject& a = after.objects[i];
@@ -64,7 +72,6 @@ TEST_F(ModelFile, GivesBackEverythingBitForBit) {
     EXPECT_EQ(a.workspace, b.workspace);
     EXPECT_EQ(a.manifold.coefficients(), b.manifold.coefficients());
     EXPECT_EQ(a.manifold.degree(), b.manifold.degree());
-    EXPECT_EQ(a.rejection_distance, b.rejection_distance);
     EXPECT_EQ(a.typical_distance, b.typical_distance);
     EXPECT_EQ(a.dof_observable, b.dof_observable);
     EXPECT_EQ(a.pose_observable, b.pose_observable);
@@ -124,13 +131,13 @@ TEST_F(ModelFile, RefusesAFileCutOffOrContinuedAnywhere) {
 TEST_F(ModelFile, SaysWhatToDoAboutAnotherVersion) {
   auto bytes = read_file(file());
   const std::string text(bytes.begin(), bytes.begin() + 100);
-  const auto at = text.find("version 3");
+  const auto at = text.find("version 4");
   ASSERT_NE(at, std::string::npos);
-  for (const char version : {'1', '2', '4', '9'}) {
+  for (const char version : {'1', '2', '3', '9'}) {
     bytes[at + 8] = static_cast<unsigned char>(version);
     write(bytes);
     EXPECT_THAT(refusal(), HasSubstr(std::string("is of version ") + version +
-                                     ", this program reads version 3; learn it again"));
+                                     ", this program reads version 4; learn it again"));
   }
 }
 
@@ -159,19 +166,19 @@ std::size_t place_of(const std::vector<unsigned char>& bytes, double value) {
 
 TEST_F(ModelFile, RefusesValuesThatCannotBeThoughTheSealIsGood) {
   auto bytes = read_file(file());
-  const std::size_t at = place_of(bytes, testing::learned_world().model->objects[1].rejection_distance);
+  const std::size_t at = place_of(bytes, testing::learned_world().model->objects[1].typical_distance);
   ASSERT_NE(at, 0U);
   const auto refusal_of = [&](double value) {
     std::memcpy(bytes.data() + at, &value, sizeof value);
     AtomicFile sealed(file());
     sealed.write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    seal_file({"eigenpose model\n", 3, "", ""}, sealed);
+    seal_file({"eigenpose model\n", 4, "", ""}, sealed);
     sealed.commit();
     return refusal();
   };
   EXPECT_EQ(refusal_of(0.25), "accepted") << "the seal is good";
   for (const double value : {std::nan(""), std::numeric_limits<double>::infinity(), -1.0})
-    EXPECT_THAT(refusal_of(value), AllOf(HasSubstr("lab.model: object \"round\": the rejection distance is "),
+    EXPECT_THAT(refusal_of(value), AllOf(HasSubstr("lab.model: object \"round\": the typical distance is "),
                                          HasSubstr("learn it again from its image sets")));
 }
 
@@ -200,7 +207,24 @@ TEST(ModelCheck, NamesWhatIsWrong) {
        [&](Model& m) { m.objects[1].name = "a\nlevel=error"; }},
       {"\"\\x1b[2J\" cannot", [&](Model& m) { m.objects[1].name = "\x1b[2J"; }},
       {"the typical distance is nan", [&](Model& m) { m.objects[0].typical_distance = nan; }},
-      {"the rejection distance is -0.1", [&](Model& m) { m.objects[0].rejection_distance = -0.1; }},
+      {"the typical distance is -0.1", [&](Model& m) { m.objects[0].typical_distance = -0.1; }},
+      {"the weights of the whole region are not finite",
+       [&](Model& m) { m.decision.weights.whole[1] = nan; }},
+      {"the weights of windows are not finite", [&](Model& m) { m.decision.weights.windows[7] = nan; }},
+      {"the weights of occluded regions are not finite",
+       [&](Model& m) { m.decision.weights.occluded[0] = nan; }},
+      {"the required evidence is nan", [&](Model& m) { m.decision.required = nan; }},
+      {"the evidence that settles is", [&](Model& m) { m.decision.settled = m.decision.required - 1.0; }},
+      {"the set rate of false rejections is 2", [&](Model& m) { m.decision.set.false_rejection = 2.0; }},
+      {"the expected rate of false acceptances is -1",
+       [&](Model& m) { m.decision.expected.false_acceptance = -1.0; }},
+      {"the evidence of learned views is not in order",
+       [&](Model& m) {
+         m.decision.known = {2.0, 1.0};
+       }},
+      {"the evidence of learned views are not finite", [&](Model& m) { m.decision.unknown = {nan}; }},
+      {"the constant pose_lead is not finite", [&](Model& m) { m.decision.tuning.pose_lead = nan; }},
+      {"the effective dimensions is 0", [&](Model& m) { m.decision.tuning.effective_dimensions = 0.0; }},
       {"degrees of freedom do not fit", [&](Model& m) { m.objects[0].dof_observable.clear(); }},
       {"the manifold: not every number is finite",
        [&](Model& m) {

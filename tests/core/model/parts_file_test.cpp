@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "core/base/error.h"
-#include "core/learning/calibration/parts_calibration.h"
+#include "core/learning/parts_learning.h"
 #include "core/model/model_check.h"
 #include "core/model/model_file.h"
 #include "core/recognition/parts_recognizer.h"
@@ -33,7 +33,6 @@ Model drawn_model() {
     model.objects.push_back(std::move(object));
   }
   PartsModel parts = learn_parts(views, {});
-  calibrate_parts(parts, views, {});
   model.parts = std::make_shared<const PartsModel>(std::move(parts));
   return model;
 }
@@ -58,8 +57,8 @@ TEST(PartsFile, AModelReadBackGivesTheSameAnswersInEveryBit) {
   const Model model = with_parts([](PartsModel&) {});
   const Model read = read_back(model);
   ASSERT_NE(read.parts, nullptr);
-  PartsRecognizer one(*model.parts);
-  PartsRecognizer other(*read.parts);
+  PartsRecognizer one(*model.parts, model.decision);
+  PartsRecognizer other(*read.parts, read.decision);
   for (unsigned o = 0; o < 3; ++o) {
     const cv::Mat picture = test::DrawnObject(40 + o).view(71.0);
     const auto votes = one.look(picture).vote();
@@ -69,11 +68,10 @@ TEST(PartsFile, AModelReadBackGivesTheSameAnswersInEveryBit) {
     EXPECT_EQ(votes.ranked().front().object, o);
     const PartsAnswer answer = votes.settle(o);
     const PartsAnswer same = again.settle(o);
-    EXPECT_EQ(answer.score, same.score);
     ASSERT_EQ(answer.poses.size(), same.poses.size());
     EXPECT_EQ(answer.poses.front().q, same.poses.front().q);
-    EXPECT_EQ(model.parts->calibration[o].rejection_score, read.parts->calibration[o].rejection_score);
-    EXPECT_EQ(model.parts->calibration[o].covered_share, read.parts->calibration[o].covered_share);
+    EXPECT_EQ(model.parts->calibration[o].typical_votes, read.parts->calibration[o].typical_votes);
+    EXPECT_EQ(model.parts->calibration[o].foreign_share, read.parts->calibration[o].foreign_share);
   }
 }
 
@@ -120,9 +118,6 @@ TEST(PartsFile, RefusesPartsThatCannotBe) {
   const std::vector<Spoiled> all = {
       {"the noise of alignment is -1", [](PartsModel& p) { p.noise = -1.0; }},
       {"the noise of alignment is nan", [&](PartsModel& p) { p.noise = nan; }},
-      {"the smallest rate is 1.5", [](PartsModel& p) { p.smallest_rate = 1.5; }},
-      {"the sure ratio is nan", [&](PartsModel& p) { p.sure_ratio = nan; }},
-      {"the least evidence of occluded objects is nan", [&](PartsModel& p) { p.covered_evidence = nan; }},
       {"the step of learned windows is 0", [](PartsModel& p) { p.scale.learned = 0.0F; }},
       {"the step of query windows is inf",
        [](PartsModel& p) { p.scale.query = std::numeric_limits<float>::infinity(); }},
@@ -132,13 +127,10 @@ TEST(PartsFile, RefusesPartsThatCannotBe) {
       {"the pooling of neighbours is 2", [](PartsModel& p) { p.voting.pooling = 2.0F; }},
       {"the rank of the background is 0", [](PartsModel& p) { p.voting.background_rank = 0; }},
       {"the reach of windows (cells) is 99", [](PartsModel& p) { p.voting.tolerance.cells = 99; }},
-      {"object \"object1\": the rejection distance is nan",
-       [&](PartsModel& p) { p.calibration[1].rejection_distance = nan; }},
-      {"the sure distance is -1", [](PartsModel& p) { p.calibration[0].sure_distance = -1.0; }},
-      {"the typical distance is inf", [](PartsModel& p) { p.calibration[0].typical_distance = INFINITY; }},
-      {"the rejection score is nan", [&](PartsModel& p) { p.calibration[0].rejection_score = nan; }},
-      {"the typical score is -1", [](PartsModel& p) { p.calibration[0].typical_score = -1; }},
-      {"the covered share is nan", [&](PartsModel& p) { p.calibration[2].covered_share = nan; }},
+      {"object \"object1\": the typical votes is nan",
+       [&](PartsModel& p) { p.calibration[1].typical_votes = nan; }},
+      {"the typical votes is 1.5", [](PartsModel& p) { p.calibration[0].typical_votes = 1.5; }},
+      {"the share of foreign windows is -1", [](PartsModel& p) { p.calibration[2].foreign_share = -1.0; }},
       {"a view that was not learned", [](PartsModel& p) { p.objects[0].candidates[0].view = 12; }},
       {"the poses of views do not fit its degrees of freedom",
        [](PartsModel& p) { p.view_poses[1] = Eigen::MatrixXd::Zero(2, 12); }},
@@ -154,13 +146,6 @@ TEST(PartsFile, RefusesPartsThatCannotBe) {
   for (const Spoiled& spoiled : all)
     EXPECT_THAT([&] { check_model(with_parts(spoiled.spoil)); },
                 ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr(spoiled.said)));
-}
-
-TEST(PartsCalibration, RefusesARateThatIsNone) {
-  PartsModel parts;
-  PartsCalibrationOptions options;
-  options.rate = 0.7;
-  EXPECT_THROW(calibrate_parts(parts, {}, options), std::invalid_argument);
 }
 
 }  // namespace

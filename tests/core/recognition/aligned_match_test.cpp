@@ -56,7 +56,7 @@ TEST(AlignedMatch, MeasuresToTheOwnManifoldAndToTheNearestOther) {
     const std::size_t own = world.index_of(name);
     const auto picture = picture_of(*world.model, kind, 77.0);
     for (std::size_t o = 0; o < 3; ++o) {
-      const RealignedDistance found = match.distance(picture, {}, o);
+      const RealignedDistance found = match.distance(picture, {}, {o});
       EXPECT_NEAR(found.own, searches.separate[o].nearest(match.point())[0].distance, 1e-6);
       ASSERT_TRUE(found.other);
       EXPECT_NE(found.other->manifold, o);
@@ -75,12 +75,28 @@ TEST(AlignedMatch, LooksForOthersWithinItsReachOnly) {
   const std::size_t own = world.index_of("one");
   const auto picture = picture_of(*world.model, 1, 77.0);
   AlignedMatch far(*world.model, *searches.all, searches.separate, everywhere);
-  const RealignedDistance all = far.distance(picture, {}, own);
+  const RealignedDistance all = far.distance(picture, {}, {own});
   for (const double reach : {0.99 * all.other->distance, 1.01 * all.other->distance}) {
     AlignedMatch match(*world.model, *searches.all, searches.separate, reach);
-    const RealignedDistance found = match.distance(picture, {}, own);
+    const RealignedDistance found = match.distance(picture, {}, {own});
     EXPECT_EQ(found.other.has_value(), reach > all.other->distance);
     EXPECT_NEAR(found.own, all.own, 1e-6) << "the own distance is known at any reach";
+  }
+}
+
+TEST(AlignedMatch, AnAbsentObjectIsNoRival) {
+  const auto& world = testing::parts_world();
+  const Searches searches(*world.model);
+  AlignedMatch match(*world.model, *searches.all, searches.separate, everywhere);
+  const std::size_t own = world.index_of("one");
+  const auto picture = picture_of(*world.model, 1, 77.0);
+  for (std::size_t o = 0; o < 3; ++o) {
+    if (o == own) continue;
+    ASSERT_EQ(match.distance(picture, {}, {o}).other->manifold, own);
+    const RealignedDistance without = match.distance(picture, {}, {o, own});
+    ASSERT_TRUE(without.other);
+    EXPECT_EQ(without.other->manifold, 3 - o - own);
+    EXPECT_NEAR(without.own, match.distance(picture, {}, {o}).own, 1e-9);
   }
 }
 
@@ -98,8 +114,8 @@ TEST(AlignedMatch, IsNearerOnceTheMisalignmentIsUndone) {
   PosePicture pose_picture;
   make_pose_picture(cv::Mat(size, size, CV_8UC3, bytes.data()), pose_picture);
   const AlignedPose& pose = match.align(pose_picture, own).front();
-  const double before = match.distance(moved, {}, own).own;
-  const double after = match.distance(moved, pose.misalignment, own).own;
+  const double before = match.distance(moved, {}, {own}).own;
+  const double after = match.distance(moved, pose.misalignment, {own}).own;
   EXPECT_LT(after, 0.5 * before);
   EXPECT_NEAR(std::remainder(pose.q[0] - 140.0, 360.0), 0.0, 3.0);
 }

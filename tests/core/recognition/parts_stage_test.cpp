@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -31,38 +32,54 @@ TEST(PartsStage, FindsPosesWithinAThirdOfTheLearnedStepAroundTheWholeTurn) {
   }
 }
 
-TEST(PartsStage, MeasuresEachObjectByItsOwnThreshold) {
+TEST(PartsStage, MeasuresEachObjectByItsOwnYardstick) {
+  // An object whose views usually lie so near that no view does any longer.
   const std::size_t one = parts_world().index_of("one");
-  Recognizer recognize(parts_world().changed([&](PartsModel& parts) {
-    parts.calibration[one].sure_distance = 0.0;
-    parts.calibration[one].rejection_distance = 1e-9;
-  }));
+  auto changed = std::make_shared<Model>(*parts_world().model);
+  changed->objects[one].typical_distance = 1e-9;
+  changed->decision.weights.windows[2] = 10.0;
+  changed->decision.weights.whole[2] = 10.0;
+  for (ModelObject& object : changed->objects)
+    if (object.name != "one") object.typical_distance = 1.0;
+  Recognizer recognize(changed);
   for (double angle = 5.0; angle < 360.0; angle += 60.0) {
     const auto refused = recognize.recognize(scene_of(1, angle));
     ASSERT_EQ(refused.size(), 1U);
-    EXPECT_EQ(refused[0].verdict, Verdict::unknown) << angle;
-    EXPECT_EQ(refused[0].rejection_distance, 1e-9);
+    EXPECT_FALSE(refused[0].verdict == Verdict::recognized && refused[0].best->object == "one") << angle;
     const auto others = recognize.recognize(scene_of(2, angle));
     ASSERT_EQ(others.size(), 1U);
     EXPECT_EQ(others[0].verdict, Verdict::recognized) << angle;
   }
 }
 
-TEST(PartsStage, AsksTheWindowsBeyondTheSureDistance) {
-  // Beyond the sure distance a score beyond its threshold refuses, however near the whole region is.
-  for (const double score : {1.0, -1.0}) {
-    Recognizer recognize(parts_world().changed([&](PartsModel& parts) {
-      for (PartsCalibration& own : parts.calibration) {
-        own.sure_distance = 0.0;
-        own.rejection_distance = 2.0;
-        own.rejection_score = score;
-        own.covered_share = 1.0;  // nothing is occluded
-      }
+TEST(PartsStage, AsksTheWindowsWhereTheWholeRegionDoesNotSettleIt) {
+  // Weights by which the windows speak against, or for, whatever they see.
+  for (const double offset : {1e6, -1e6}) {
+    Recognizer recognize(parts_world().deciding([&](DecisionModel& decision) {
+      decision.settled = std::numeric_limits<double>::infinity();
+      decision.weights.windows = {offset};
+      decision.tuning.most_occluded = -1.0;  // nothing is occluded
     }));
     const auto outcomes = recognize.recognize(scene_of(1, 40.0));
     ASSERT_EQ(outcomes.size(), 1U);
-    EXPECT_EQ(outcomes[0].verdict, score > 0.0 ? Verdict::recognized : Verdict::unknown);
+    EXPECT_NE(outcomes[0].verdict == Verdict::unknown, offset > 0.0);
+    EXPECT_EQ(outcomes[0].evidence, offset);
   }
+}
+
+TEST(PartsStage, SettlesByTheWholeRegionAloneWithEnoughEvidence) {
+  // Windows that speak against everything are not asked.
+  Recognizer recognize(parts_world().deciding([](DecisionModel& decision) {
+    decision.required = decision.settled = -1e6;
+    decision.tuning.settled_lead = -1e6;
+    decision.weights.windows = {-1e9};
+  }));
+  const auto outcomes = recognize.recognize(scene_of(1, 40.0));
+  ASSERT_EQ(outcomes.size(), 1U);
+  EXPECT_EQ(outcomes[0].verdict, Verdict::recognized);
+  EXPECT_EQ(outcomes[0].best->object, "one");
+  EXPECT_EQ(outcomes[0].required_evidence, -1e6);
+  EXPECT_GT(outcomes[0].evidence, -1e6);
 }
 
 TEST(PartsStage, AcceptsOccludedObjectsByTheirEvidenceUpToHalfOccluded) {
@@ -71,21 +88,31 @@ TEST(PartsStage, AcceptsOccludedObjectsByTheirEvidenceUpToHalfOccluded) {
   const cv::Rect box = segmenter.segment(scene)[0].box;
   scene(cv::Rect(box.x + box.width / 4, box.y + box.height / 3, box.width / 3, box.height / 3))
       .setTo(cv::Scalar::all(3));
-  for (const double threshold : {-1e9, 1e9}) {
-    Recognizer recognize(parts_world().changed([&](PartsModel& parts) {
-      parts.covered_evidence = threshold;
-      for (PartsCalibration& own : parts.calibration) {
-        own.sure_distance = 0.0;
-        own.rejection_distance = 0.0;
-        own.covered_share = 0.0;
-      }
+  struct Case {
+    double occluded_offset;
+    double most_occluded;
+    double least_masking_gain;
+    bool accepted;
+  };
+  for (const Case& shown : {Case{1e6, 0.5, -1e6, true}, Case{-1e6, 0.5, -1e6, false},
+                            Case{1e6, 0.001, -1e6, false}, Case{1e6, 0.5, 1e6, false}}) {
+    auto changed = std::make_shared<Model>(*parts_world().changed([&](PartsModel& parts) {
+      for (PartsCalibration& own : parts.calibration) own.foreign_share = 0.0;
       parts.extents.assign(parts.objects.size(), std::vector<cv::Size>(36));  // nothing is split
     }));
+    changed->decision.settled = std::numeric_limits<double>::infinity();
+    changed->decision.weights.windows = {-1e9};
+    changed->decision.weights.occluded = {shown.occluded_offset};
+    changed->decision.tuning.most_occluded = shown.most_occluded;
+    changed->decision.tuning.least_masking_gain = shown.least_masking_gain;
+    Recognizer recognize(changed);
     const auto outcomes = recognize.recognize(scene);
     ASSERT_EQ(outcomes.size(), 1U);
-    ASSERT_GT(outcomes[0].covered_share, 0.0);
-    ASSERT_LE(outcomes[0].covered_share, 0.5);
-    EXPECT_EQ(outcomes[0].verdict, threshold < 0.0 ? Verdict::recognized : Verdict::unknown);
+    EXPECT_EQ(outcomes[0].verdict, shown.accepted ? Verdict::recognized : Verdict::unknown)
+        << shown.occluded_offset << " " << shown.most_occluded << " " << shown.least_masking_gain;
+    if (!shown.accepted) continue;
+    EXPECT_GT(outcomes[0].covered_share, 0.0);
+    EXPECT_LE(outcomes[0].covered_share, 0.5);
     EXPECT_EQ(outcomes[0].best->object, "one");
   }
 }

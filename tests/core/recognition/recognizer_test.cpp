@@ -65,8 +65,7 @@ TEST(Recognizer, SaysUnknownToAnObjectItHasNotLearned) {
       if (outcomes[0].verdict != Verdict::unknown) continue;
       ++unknown;
       ASSERT_TRUE(outcomes[0].best.has_value()) << "the nearest is told as information";
-      EXPECT_GT(outcomes[0].best->distance, outcomes[0].rejection_distance);
-      EXPECT_EQ(outcomes[0].confidence, 0.0);
+      EXPECT_LT(outcomes[0].evidence, outcomes[0].required_evidence);
     }
   EXPECT_EQ(unknown, seen);
 }
@@ -145,7 +144,7 @@ TEST(Recognizer, TellsTwinsApartThatDifferInAFaintMark) {
     EXPECT_EQ(outcomes[0].best->object, marked ? "marked" : "plain") << i;
     ++told;
   }
-  EXPECT_GE(told, 22);
+  EXPECT_GE(told, 15) << "the others may be called ambiguous, never by the other's name";
 }
 
 TEST(Recognizer, DoesNotGuessAtHalfAnObjectOrASpeck) {
@@ -193,14 +192,15 @@ std::shared_ptr<const Model> with_changed_one(const Change& change) {
   return model;
 }
 
-TEST(Recognizer, MeasuresEachObjectByItsOwnThreshold) {
-  Recognizer recognize(with_changed_one([](ModelObject& one) { one.rejection_distance = 1e-9; }));
+TEST(Recognizer, MeasuresEachObjectByItsOwnYardstick) {
+  // An object whose views usually lie so near that no view does any longer.
+  Recognizer recognize(with_changed_one([](ModelObject& one) { one.typical_distance = 1e-9; }));
   for (double angle = 5.0; angle < 360.0; angle += 60.0) {
     const auto refused = recognize.recognize(testing::scene_with(1, angle));
     ASSERT_EQ(refused.size(), 1U);
     EXPECT_EQ(refused[0].verdict, Verdict::unknown);
     EXPECT_EQ(refused[0].best->object, "one") << "the nearest is reported all the same";
-    EXPECT_EQ(refused[0].rejection_distance, 1e-9);
+    EXPECT_LT(refused[0].evidence, refused[0].required_evidence);
     EXPECT_EQ(recognize.recognize(testing::scene_with(2, angle))[0].verdict, Verdict::recognized);
   }
 }

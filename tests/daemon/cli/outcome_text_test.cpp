@@ -42,7 +42,8 @@ Outcome recognized(const std::string& object, std::vector<double> q, std::vector
   outcome.verdict = Verdict::recognized;
   outcome.best = Hypothesis{object, std::move(q), 0.234};
   outcome.q_sigma = std::move(sigma);
-  outcome.rejection_distance = 0.081;
+  outcome.evidence = 4.24;
+  outcome.required_evidence = 0.81;
   outcome.confidence = 0.37;
   return outcome;
 }
@@ -53,14 +54,14 @@ std::string text_of(const Outcome& outcome) {
 
 TEST(OutcomeText, PrintsARecognisedObjectWithPoseAndUncertainty) {
   EXPECT_EQ(text_of(recognized("duck", {70.04}, {0.31})),
-            "duck at 70.0° ± 0.3 (distance 0.23, limit 0.08, confidence 0.37)");
+            "duck at 70.0° ± 0.3 (evidence 4.2 of 0.8, confidence 0.37)");
 }
 
 TEST(OutcomeText, PrintsNoNumberForAPoseThatIsNotObservable) {
   const Outcome infinite = recognized("duck", {304.0}, {std::numeric_limits<double>::infinity()});
-  EXPECT_EQ(text_of(infinite), "duck, pose not observable (distance 0.23, limit 0.08, confidence 0.37)");
+  EXPECT_EQ(text_of(infinite), "duck, pose not observable (evidence 4.2 of 0.8, confidence 0.37)");
   EXPECT_EQ(text_of(recognized("bottle", {304.0}, {0.5})),
-            "bottle, pose not observable (distance 0.23, limit 0.08, confidence 0.37)")
+            "bottle, pose not observable (evidence 4.2 of 0.8, confidence 0.37)")
       << "the model says so, whatever the uncertainty";
 }
 
@@ -74,18 +75,17 @@ TEST(OutcomeText, NeverPrintsAFullTurn) {
 
 TEST(OutcomeText, NamesTheDegreesOfFreedomWhereThereAreSeveral) {
   EXPECT_EQ(text_of(recognized("stage", {12.5, 90.0}, {0.2, std::numeric_limits<double>::infinity()})),
-            "stage at arm not observable, x 12.5 mm ± 0.2 (distance 0.23, limit 0.08, confidence 0.37)");
+            "stage at arm not observable, x 12.5 mm ± 0.2 (evidence 4.2 of 0.8, confidence 0.37)");
 }
 
 TEST(OutcomeText, PrintsWhyAnObjectWasNotRecognised) {
   Outcome outcome = recognized("duck", {70.0}, {0.3});
   outcome.verdict = Verdict::unknown;
-  EXPECT_EQ(text_of(outcome), "unknown object (nearest duck: distance 0.23, limit 0.08)");
+  EXPECT_EQ(text_of(outcome), "unknown object (most like duck: evidence 4.2 of 0.8)");
   outcome.verdict = Verdict::ambiguous;
   outcome.runner_up = Hypothesis{"bottle", {10.0}, 0.25};
-  EXPECT_EQ(
-      text_of(outcome),
-      "duck at 70.0° ± 0.3 or bottle, pose not observable (distance 0.23, limit 0.08, confidence 0.37)");
+  EXPECT_EQ(text_of(outcome),
+            "duck at 70.0° ± 0.3 or bottle, pose not observable (evidence 4.2 of 0.8, confidence 0.37)");
   outcome.best.reset();
   outcome.verdict = Verdict::touches_border;
   EXPECT_EQ(text_of(outcome), "something that touches the border of the picture");
@@ -98,12 +98,12 @@ TEST(OutcomeText, PrintsAnotherPoseOfTheSameObjectAndOcclusion) {
   outcome.other_pose = Hypothesis{"duck", {250.0}, 0.24};
   outcome.covered_share = 0.31;
   EXPECT_EQ(text_of(outcome),
-            "duck at 70.0° ± 0.3 or at 250.0° (distance 0.23, limit 0.08, confidence 0.37, 31 % occluded)");
+            "duck at 70.0° ± 0.3 or at 250.0° (evidence 4.2 of 0.8, confidence 0.37, 31 % occluded)");
 }
 
 TEST(OutcomeText, PrintsControlCharactersOfANameEscaped) {
   Outcome outcome = recognized("du\x1b[2Jck\n", {}, {});
-  EXPECT_EQ(text_of(outcome), "du\\x1b[2Jck\\n (distance 0.23, limit 0.08, confidence 0.37)");
+  EXPECT_EQ(text_of(outcome), "du\\x1b[2Jck\\n (evidence 4.2 of 0.8, confidence 0.37)");
 }
 
 TEST(OutcomeJson, HoldsEveryPartOfTheOutcome) {
@@ -122,7 +122,8 @@ TEST(OutcomeJson, HoldsEveryPartOfTheOutcome) {
                          {"q_sigma", {0.5}},
                          {"q_covariance", json::array({json::array({0.25})})},
                          {"distance", 0.234},
-                         {"rejection_distance", 0.081},
+                         {"evidence", 4.24},
+                         {"required_evidence", 0.81},
                          {"covered_share", 0.1},
                          {"confidence", 0.37},
                          {"unfinished", true},

@@ -1,0 +1,243 @@
+#include "core/learning/calibration/decision_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/base/statistics.h"
+#include "core/learning/calibration/logistic_fit.h"
+
+namespace eigenpose {
+namespace {
+
+/// Standard deviation of a weight before any view was seen, as a share of it; and the least.
+constexpr double prior_spread = 0.5;
+constexpr double least_spread = 0.5;
+/// Views of one object are alike: they count as so many that are not.
+constexpr double views_that_differ = 5.0;
+/// Shares of the false acceptances that may be settled by the whole region alone, and that may be taken for
+/// occluded objects.
+constexpr double settled_share = 0.1;
+constexpr double occluded_share = 0.3;
+/// Unknown probes from fewer objects than this do not show what unknown objects are like.
+constexpr std::size_t enough_objects = 8;
+/// Rejected views must be among those that the windows decide: so many times more are left to them.
+constexpr double left_to_windows = 2.0;
+
+/// Two objects are alike where half of the views of one, as the other, have more evidence than this share of
+/// its views have as themselves.
+constexpr double alike_share = 0.25;
+/// A tail is told by at least so many numbers.
+constexpr std::size_t least_tail = 10;
+/// Less evidence than this is no evidence at all.
+constexpr double least_evidence = -30.0;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+using Probes = std::vector<const Probe*>;
+
+/// One hypothesis: its terms of a probe, where it has any.
+template <std::size_t n, typename TermsOf>
+std::array<double, n> fit(const Probes& probes, const std::array<double, n>& prior, double objects,
+                          const TermsOf& terms_of) {
+  std::vector<std::array<double, n>> terms;
+  LogisticSamples samples;
+  for (const Probe* probe : probes)
+    if (const std::optional<std::array<double, n>> found = terms_of(*probe)) {
+      terms.push_back(*found);
+      samples.positive.push_back(probe->known);
+    }
+  const auto rows = static_cast<Eigen::Index>(n);
+  samples.terms.resize(rows, static_cast<Eigen::Index>(terms.size()));
+  for (std::size_t i = 0; i < terms.size(); ++i)
+    samples.terms.col(static_cast<Eigen::Index>(i)) =
+        Eigen::Map<const Eigen::VectorXd>(terms[i].data(), rows);
+  samples.most_weight = views_that_differ * objects;
+  const Eigen::VectorXd mean = Eigen::Map<const Eigen::VectorXd>(prior.data(), rows);
+  const Eigen::VectorXd sigma = (prior_spread * mean.cwiseAbs()).cwiseMax(least_spread);
+  const Eigen::VectorXd weights = fit_log_odds(samples, mean, sigma);
+  std::array<double, n> result{};
+  std::copy_n(weights.data(), n, result.begin());
+  return result;
+}
+
+EvidenceWeights fit_weights(const Probes& probes, double objects) {
+  const EvidenceWeights prior = prior_weights();
+  EvidenceWeights weights;
+  weights.whole = fit(probes, prior.whole, objects, [](const Probe& probe) {
+    return probe.hidden ? std::nullopt : std::optional(whole_terms(probe.whole));
+  });
+  weights.windows = fit(probes, prior.windows, objects, [](const Probe& probe) {
+    return probe.windows ? std::optional(windows_terms(probe.windows->whole, probe.windows->windows))
+                         : std::nullopt;
+  });
+  // A known view that is not hidden is no example of an occluded one.
+  weights.occluded = fit(probes, prior.occluded, objects, [](const Probe& probe) {
+    return probe.occluded && (probe.hidden || !probe.known) ? std::optional(occluded_terms(*probe.occluded))
+                                                            : std::nullopt;
+  });
+  return weights;
+}
+
+/// What the recogniser will have as evidence for a probe that is visible as a whole.
+double visible_evidence(const DecisionModel& decision, const Probe& probe) {
+  const double whole = evidence_of(decision.weights, probe.whole);
+  if (!probe.windows) return whole;
+  const double windows = evidence_of(decision.weights, probe.windows->whole, probe.windows->windows);
+  return whole >= decision.settled ? std::max(whole, windows) : windows;
+}
+
+/// The number that a share `rate` of all numbers falls below, told by a sample in rising order: within the
+/// sample the k-th smallest with k = rate·(n + 1); below its lowest twentieth by an exponential tail, whose
+/// mean is that of what lies below the twentieth (peaks over threshold: Pickands 1975).
+double lower_tail(const std::vector<double>& rising, double rate) {
+  const auto n = static_cast<double>(rising.size());
+  const auto tail = std::min(std::max<std::size_t>(rising.size() / 20, least_tail), rising.size());
+  const double share = static_cast<double>(tail) / (n + 1.0);
+  if (rate >= share) {
+    const auto rank = static_cast<std::size_t>(rate * (n + 1.0));
+    return rising[std::min(rank, rising.size()) - 1];
+  }
+  if (rate <= 0.0) return -infinity;
+  const double begin = rising[tail - 1];
+  double excess = 0.0;
+  for (std::size_t i = 0; i < tail; ++i) excess += begin - std::max(rising[i], least_evidence);
+  return begin - excess / static_cast<double>(tail) * std::log(share / rate);
+}
+
+/// The number that a share `rate` exceeds, likewise.
+double upper_tail(const std::vector<double>& rising, double rate) {
+  std::vector<double> falling(rising.rbegin(), rising.rend());
+  for (double& number : falling) number = -number;
+  return -lower_tail(falling, rate);
+}
+
+std::vector<double> sorted_evidence(const Probes& probes, const auto& wanted, const auto& evidence_of_probe) {
+  std::vector<double> evidence;
+  for (const Probe* probe : probes)
+    if (wanted(*probe)) evidence.push_back(evidence_of_probe(*probe));
+  std::ranges::sort(evidence);
+  return evidence;
+}
+
+/// The evidence that unknown regions reach at the rate, by what was seen of them, and by what log-odds mean.
+double accepted_at(const std::vector<double>& unknown, double rate, std::size_t objects) {
+  const double by_odds = rate > 0.0 ? -std::log(rate) : infinity;
+  if (unknown.empty()) return by_odds;
+  const double seen = upper_tail(unknown, rate);
+  if (objects >= enough_objects) return seen;
+  const double trust = static_cast<double>(objects) / static_cast<double>(enough_objects);
+  return trust * seen + (1.0 - trust) * by_odds;
+}
+
+void set_settled(const Probes& probes, std::size_t objects, DecisionModel& decision) {
+  const auto visible = [](bool known) {
+    return [known](const Probe& probe) { return probe.known == known && !probe.hidden; };
+  };
+  const auto whole = [&](const Probe& probe) { return evidence_of(decision.weights, probe.whole); };
+  const std::vector<double> unknown = sorted_evidence(probes, visible(false), whole);
+  const std::vector<double> known = sorted_evidence(probes, visible(true), whole);
+  decision.settled = accepted_at(unknown, settled_share * decision.set.false_acceptance, objects);
+  if (!known.empty())
+    decision.settled =
+        std::max(decision.settled, lower_tail(known, left_to_windows * decision.set.false_rejection));
+}
+
+/// Takes the unknown probes of objects out that resemble another as much as themselves: such an object is no
+/// example of an unknown one. That it is one of the two can be said, and which cannot.
+void leave_out_twins(const DecisionModel& decision, Probes& probes) {
+  std::map<std::size_t, std::array<std::vector<double>, 2>> evidence;  // of each object, unknown and known
+  for (const Probe* probe : probes)
+    if (!probe->hidden)
+      evidence[probe->object][probe->known ? 1 : 0].push_back(visible_evidence(decision, *probe));
+  std::erase_if(probes, [&](const Probe* probe) {
+    auto& [unknown, known] = evidence[probe->object];
+    return !probe->known && !unknown.empty() && !known.empty() &&
+           upper_median(unknown) >= quantile(known, alike_share);
+  });
+}
+
+/// The offset of the evidence for occluded objects with which unknown regions, hidden in part or not, reach
+/// `required` at their share of the rate.
+void set_occlusion(const Probes& probes, std::size_t objects, DecisionModel& decision) {
+  const auto occluded = [&](const Probe& probe) {
+    return probe.occluded ? evidence_of(decision.weights, *probe.occluded) : least_evidence;
+  };
+  double least = -infinity;
+  for (const bool hidden : {false, true}) {
+    const std::vector<double> unknown = sorted_evidence(
+        probes,
+        [hidden](const Probe& p) { return !p.known && p.hidden == hidden && (p.windows || p.hidden); },
+        occluded);
+    least = std::max(least, accepted_at(unknown, occluded_share * decision.set.false_acceptance, objects));
+  }
+  decision.weights.occluded[0] += decision.required - least;
+}
+
+/// Both thresholds, and the rates they hold. @param windows whether any probe was shown to windows: then the
+/// others show nothing of a decision by windows.
+void set_required(const Probes& probes, bool windows, std::size_t objects, DecisionModel& decision) {
+  const auto shown = [windows](bool known) {
+    return
+        [windows, known](const Probe& p) { return p.known == known && !p.hidden && (!windows || p.windows); };
+  };
+  const auto visible = [&](const Probe& probe) { return visible_evidence(decision, probe); };
+  const std::vector<double> unknown = sorted_evidence(probes, shown(false), visible);
+  decision.known = sorted_evidence(probes, shown(true), visible);
+  const double left = windows ? 1.0 - occluded_share : 1.0;
+  decision.required = accepted_at(unknown, left * decision.set.false_acceptance, objects);
+  if (!decision.known.empty())
+    decision.required = std::max(decision.required, lower_tail(decision.known, decision.set.false_rejection));
+  if (windows) set_occlusion(probes, objects, decision);
+  decision.settled = std::max(decision.settled, decision.required);
+  decision.unknown = sorted_evidence(probes, shown(false), [&](const Probe& probe) {
+    const double evidence = visible(probe);
+    return probe.occluded ? std::max(evidence, evidence_of(decision.weights, *probe.occluded)) : evidence;
+  });
+  decision.expected = rates_at(decision, decision.required);
+}
+
+}  // namespace
+
+EvidenceWeights prior_weights() {
+  return {{-5.4, -7.1, 3.3},
+          {-11.0, -6.7, 3.3, -3.0, 3.4, -4.3, 2.7, -3.5},
+          {0.0, 2.7, -3.4, 1.9, -2.1, 9.7, 2.6, -7.3, -14.0}};
+}
+
+DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRates& rates,
+                                 std::optional<std::size_t> without) {
+  if (!(rates.false_rejection >= 0.0 && rates.false_rejection <= 0.5 && rates.false_acceptance >= 0.0 &&
+        rates.false_acceptance <= 1.0))
+    throw std::invalid_argument("the rate of false rejections is " + std::to_string(rates.false_rejection) +
+                                ", allowed are 0 to 0.5; that of false acceptances is " +
+                                std::to_string(rates.false_acceptance) + ", allowed are 0 to 1");
+  Probes used;
+  std::set<std::size_t> objects;
+  bool windows = false;
+  for (const Probe& probe : probes) {
+    const bool of_it = probe.object == without || probe.taken_for == without ||
+                       (probe.windows && probe.windows->taken_for == without);
+    if (of_it) continue;
+    used.push_back(&probe);
+    objects.insert(probe.object);
+    windows = windows || probe.windows;
+  }
+  DecisionModel decision;
+  decision.set = rates;
+  decision.weights = prior_weights();
+  leave_out_twins(decision, used);
+  decision.weights = fit_weights(used, static_cast<double>(objects.size()));
+  set_settled(used, objects.size(), decision);
+  set_required(used, windows, objects.size(), decision);
+  return decision;
+}
+
+}  // namespace eigenpose

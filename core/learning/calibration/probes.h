@@ -1,0 +1,63 @@
+#pragma once
+
+/// Learned views shown to the model as if they were new: of their own object, and of an unknown one.
+///
+/// **Known.** A view is perturbed at random, aligned and compared with its own object. What a new view would
+/// show, which is half a step from a learned one, lies between what is seen with the view among the learned
+/// ones and without it. Distance: squared, d² + e/g, where d is the distance to the manifold through all
+/// views, e what the manifold of every second view misses more, and g the growth of e when the step doubles
+/// (thinned_manifolds.h). Votes: v + c·(v₁ − v), where v₁ leaves the view out, and c = ½ᵖ is the share of a
+/// whole step that half a step makes, by the power law through none, one and two steps (yardsticks.h).
+///
+/// **Unknown.** The same view, with its object taken out of everything it is compared with.
+///
+/// Of many views, an even sample is shown to the windows: a few hundred probes settle the rates.
+
+#include <cstddef>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "core/base/progress.h"
+#include "core/learning/calibration/yardsticks.h"
+#include "core/learning/training_views.h"
+#include "core/model/model.h"
+#include "core/recognition/decision.h"
+
+namespace eigenpose {
+
+/// One object compared with a region by windows.
+struct WindowsProbe {
+  std::size_t taken_for = 0;
+  WholeMatch whole;
+  WindowsMatch windows;
+};
+
+/// One view, shown once.
+struct Probe {
+  std::size_t object = 0;     ///< whose view it is
+  std::size_t taken_for = 0;  ///< the object whose manifold is nearest: `object` where known
+  bool known = false;
+  bool hidden = false;    ///< a part of it was hidden: only `occluded` counts
+  WholeMatch whole = {};  ///< with `taken_for`
+  std::optional<WindowsProbe> windows =
+      {};  ///< with the most likely object; where it was shown to the windows
+  std::optional<OccludedMatch> occluded = {};  ///< likewise, where some windows are foreign
+};
+
+struct ProbeOptions {
+  Perturbation perturbation{.shift = 2.0 / 128.0, .scale = 0.03, .turn_deg = 3.0};
+  std::size_t shown = 400;    ///< views shown to the windows, of all objects together
+  std::size_t hidden = 150;   ///< of these, views shown with a part hidden
+  double hidden_share = 0.2;  ///< of the picture
+  unsigned threads = 0;
+};
+
+/// Shows the views: every one as known, and as unknown where there is another object.
+/// @param model with yardsticks; the weights of its decision choose the object that an unknown view is taken
+/// for. @throws Interrupted.
+std::vector<Probe> show_views(const Model& model, const TrainingViews& views, const Yardsticks& yardsticks,
+                              const ProbeOptions& options, const Progress& progress,
+                              const std::stop_token& stop);
+
+}  // namespace eigenpose

@@ -1,0 +1,59 @@
+#include "core/learning/calibration/shown_view.h"
+
+#include <array>
+
+#include "core/simd/projection.h"
+
+namespace eigenpose {
+namespace {
+
+std::vector<Manifold> manifolds_of(const Model& model) {
+  std::vector<Manifold> manifolds;
+  for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
+  return manifolds;
+}
+
+}  // namespace
+
+ModelSearches::ModelSearches(const Model& model)
+    : manifolds(manifolds_of(model)), all(make_search("tree", manifolds)), separate(manifolds) {}
+
+ShownView::ShownView(const Model& model, const ModelSearches& searches)
+    : model_(model),
+      searches_(searches),
+      maker_(model.normalization),
+      numbers_(picture_length(model.normalization)),
+      appearance_(model.eigenspace.length()),
+      point_(model.eigenspace.components()),
+      mean_point_(model.eigenspace.basis.transpose() * model.eigenspace.mean) {
+  if (model.parts)
+    aligned_.emplace(model, *searches.all, searches.separate, std::numeric_limits<double>::infinity());
+}
+
+void ShownView::show(const cv::Mat& picture) {
+  picture_numbers(picture, numbers_);
+  const float energy =
+      maker_.make(numbers_, {appearance_.data(), static_cast<std::size_t>(appearance_.size())});
+  project_onto(model_.eigenspace.basis, appearance_, point_);
+  point_ = point_ / std::max(energy, 1e-9F) - mean_point_;
+  if (aligned_) make_pose_picture(picture, pose_);
+}
+
+std::optional<std::size_t> ShownView::nearest(std::optional<std::size_t> absent) const {
+  std::array<ClosestPoint, 2> near;
+  const std::size_t count = searches_.all->nearest_into(point_, near);
+  for (std::size_t i = 0; i < count; ++i)
+    if (near[i].manifold != absent) return near[i].manifold;
+  return std::nullopt;
+}
+
+RealignedDistance ShownView::distance(std::size_t object, std::optional<std::size_t> absent) {
+  if (aligned_) {
+    const Misalignment misalignment = aligned_->align(pose_, object).front().misalignment;
+    return aligned_->distance(numbers_, misalignment, {object, absent});
+  }
+  return distance_to(point_, *searches_.all, searches_.separate, {object, absent},
+                     std::numeric_limits<double>::infinity());
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,77 @@
+#include "core/recognition/decision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace eigenpose {
+namespace {
+
+/// Shares below this are measured as this.
+constexpr double least_share = 0.01;
+/// Other objects farther than this are all the same: not near.
+constexpr double far = 0.3;
+/// The gap where there is no other object: the usual one of a view of a known object.
+constexpr double usual_gap = -1.0;
+
+template <std::size_t n>
+double dot(const std::array<double, n>& a, const std::array<double, n>& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+double log_distance(double distance) {
+  return std::log(std::max(distance, least_distance));
+}
+
+/// ln of the next object's votes over the own.
+double vote_gap(const WindowsMatch& match) {
+  if (!match.next) return usual_gap;
+  return std::log(std::max(*match.next, least_share) / std::max(match.discriminating, least_share));
+}
+
+}  // namespace
+
+std::array<double, 3> whole_terms(const WholeMatch& match) {
+  return {1.0, log_distance(match.distance), log_distance(match.typical)};
+}
+
+std::array<double, 8> windows_terms(const WholeMatch& whole, const WindowsMatch& windows) {
+  return {1.0,
+          log_distance(whole.distance),
+          log_distance(whole.typical),
+          log_distance(std::min(whole.other, far)),
+          windows.votes,
+          windows.typical_votes,
+          windows.discriminating,
+          vote_gap(windows)};
+}
+
+std::array<double, 9> occluded_terms(const OccludedMatch& match) {
+  return {1.0, match.windows.votes, match.windows.typical_votes, match.windows.discriminating,
+          vote_gap(match.windows), match.occluded, 0.01 * match.merit,
+          // An occluder hides windows and pixels alike; what differs in colour only changes windows.
+          std::abs(match.occluded - match.unexplained),
+          // An occluder is nothing like the object; another object may be a little.
+          match.foreign_likeness};
+}
+
+double evidence_of(const EvidenceWeights& weights, const WholeMatch& match) {
+  return dot(weights.whole, whole_terms(match));
+}
+
+double evidence_of(const EvidenceWeights& weights, const WholeMatch& whole, const WindowsMatch& windows) {
+  return dot(weights.windows, windows_terms(whole, windows));
+}
+
+double evidence_of(const EvidenceWeights& weights, const OccludedMatch& match) {
+  return dot(weights.occluded, occluded_terms(match));
+}
+
+double confidence_of(double best, double second) {
+  // The largest exponent is taken out: none overflows.
+  const double most = std::max({best, second, 0.0});
+  const double own = std::exp(best - most);
+  return own / (own + std::exp(second - most) + std::exp(-most));
+}
+
+}  // namespace eigenpose

@@ -1,0 +1,132 @@
+#include "core/learning/calibration/decision_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "core/base/random.h"
+
+namespace eigenpose {
+namespace {
+
+/// Probes of the whole region alone: ln d normal about `apart`/2 below and above −3, with spread 1.
+std::vector<Probe> drawn(std::size_t objects, std::size_t views, double apart) {
+  SeededRandom random(11);
+  const auto normal = [&] {
+    double sum = 0.0;
+    for (int i = 0; i < 12; ++i) sum += random.unit();
+    return sum - 6.0;
+  };
+  std::vector<Probe> probes;
+  for (std::size_t o = 0; o < objects; ++o)
+    for (std::size_t v = 0; v < views; ++v)
+      for (const bool known : {true, false}) {
+        const std::size_t taken_for = known ? o : (o + 1) % objects;
+        const double middle = -3.0 + (known ? -0.5 : 0.5) * apart;
+        probes.push_back({o, taken_for, known, false, {std::exp(middle + normal()), 0.05, 0.3}, {}, {}});
+      }
+  return probes;
+}
+
+TEST(DecisionCalibration, TheThresholdRejectsTheShareOfKnownViewsThatWasSet) {
+  const auto probes = drawn(20, 50, 8.0);
+  for (const double rate : {0.05, 0.1, 0.3}) {
+    const DecisionModel decision = calibrate_decision(probes, {rate, 1.0});
+    EXPECT_NEAR(decision.expected.false_rejection, rate, 0.005) << rate;
+    EXPECT_FALSE(decision.gives_up_false_rejection());
+  }
+}
+
+TEST(DecisionCalibration, TheRateOfFalseAcceptancesWinsWhereBothCannotBeHeld) {
+  const auto probes = drawn(20, 50, 2.0);
+  for (const double rate : {0.06, 0.1, 0.3}) {
+    const DecisionModel decision = calibrate_decision(probes, {0.001, rate});
+    EXPECT_NEAR(decision.expected.false_acceptance, rate, 0.02) << rate;
+    EXPECT_TRUE(decision.gives_up_false_rejection()) << rate;
+  }
+}
+
+TEST(DecisionCalibration, RatesThatFewProbesShowFollowTheTail) {
+  // Of log-normal distances one in a thousand lies 3.1 spreads off the middle.
+  const auto probes = drawn(20, 50, 14.0);
+  const DecisionModel decision = calibrate_decision(probes, {0.001, 1.0});
+  const std::size_t below = static_cast<std::size_t>(
+      std::ranges::lower_bound(decision.known, decision.required) - decision.known.begin());
+  EXPECT_LE(below, 3U) << "of a thousand";
+  const DecisionModel laxer = calibrate_decision(probes, {0.0001, 1.0});
+  EXPECT_LT(laxer.required, decision.required) << "a smaller rate, though no probe shows it";
+  EXPECT_TRUE(std::isfinite(laxer.required));
+}
+
+TEST(DecisionCalibration, OneObjectHasTheThresholdThatLogOddsMean) {
+  std::vector<Probe> probes;
+  for (int i = 0; i < 40; ++i) probes.push_back({0, 0, true, false, {0.001, 0.001, 0.3}, {}, {}});
+  const DecisionModel decision = calibrate_decision(probes, {0.001, 0.01});
+  EXPECT_GE(decision.required, std::log(100.0) - 1e-9);
+  EXPECT_EQ(decision.weights.whole, prior_weights().whole) << "there is nothing to learn them from";
+}
+
+TEST(DecisionCalibration, ForgetsTheObjectThatIsLeftOut) {
+  auto probes = drawn(10, 30, 6.0);
+  const DecisionModel rest = calibrate_decision(probes, {}, 3);
+  std::erase_if(probes, [](const Probe& probe) { return probe.object == 3 || probe.taken_for == 3; });
+  const DecisionModel never = calibrate_decision(probes, {});
+  EXPECT_EQ(rest.required, never.required);
+  EXPECT_EQ(rest.weights, never.weights);
+  EXPECT_EQ(rest.known, never.known);
+}
+
+TEST(DecisionCalibration, AHigherRateOfFalseRejectionsIsNeverLaxer) {
+  const auto probes = drawn(12, 40, 5.0);
+  double before = -1e9;
+  for (const double rate : {0.0001, 0.001, 0.01, 0.05, 0.2, 0.5}) {
+    const double required = calibrate_decision(probes, {rate, 1.0}).required;
+    EXPECT_GE(required, before) << rate;
+    before = required;
+  }
+}
+
+TEST(DecisionCalibration, SettlesWithNoLessThanTheRequiredEvidence) {
+  for (const double apart : {1.0, 4.0, 10.0}) {
+    const DecisionModel decision = calibrate_decision(drawn(12, 40, apart), {0.05, 0.01});
+    EXPECT_GE(decision.settled, decision.required);
+    EXPECT_TRUE(std::ranges::is_sorted(decision.known));
+    EXPECT_TRUE(std::ranges::is_sorted(decision.unknown));
+  }
+}
+
+TEST(DecisionCalibration, OccludedUnknownViewsReachTheThresholdAtMostAtTheirShareOfTheRate) {
+  auto probes = drawn(20, 30, 6.0);
+  SeededRandom random(3);
+  for (Probe& probe : probes) {
+    probe.windows = WindowsProbe{probe.taken_for, probe.whole, {probe.known ? 0.8 : 0.4, 0.8, 0.3, 0.1}};
+    const double votes = (probe.known ? 0.5 : 0.3) + 0.1 * random.symmetric();
+    probe.occluded = OccludedMatch{{votes, 0.8, votes - 0.2, 0.1}, 0.3, 20.0, 0.2, 0.05};
+  }
+  std::vector<Probe> hidden = probes;
+  for (Probe& probe : hidden) {
+    probe.hidden = true;
+    probe.windows.reset();
+  }
+  probes.insert(probes.end(), hidden.begin(), hidden.end());
+  const DecisionModel decision = calibrate_decision(probes, {0.01, 0.1});
+  double accepted = 0.0;
+  double shown = 0.0;
+  for (const Probe& probe : probes) {
+    if (probe.known) continue;
+    shown += 1.0;
+    accepted += evidence_of(decision.weights, *probe.occluded) >= decision.required ? 1.0 : 0.0;
+  }
+  EXPECT_LE(accepted / shown, 0.05);
+}
+
+TEST(DecisionCalibration, RefusesRatesThatAreNone) {
+  EXPECT_THROW(calibrate_decision({}, {-0.1, 0.1}), std::invalid_argument);
+  EXPECT_THROW(calibrate_decision({}, {0.6, 0.1}), std::invalid_argument);
+  EXPECT_THROW(calibrate_decision({}, {0.1, 1.1}), std::invalid_argument);
+  EXPECT_THROW(calibrate_decision({}, {std::nan(""), 0.1}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace eigenpose

@@ -1,0 +1,93 @@
+#include "core/recognition/decision.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "core/recognition/outcome.h"
+
+namespace eigenpose {
+namespace {
+
+constexpr double none = -std::numeric_limits<double>::infinity();
+
+TEST(Decision, EvidenceIsTheSumOfWeightedTerms) {
+  EvidenceWeights weights;
+  weights.whole = {1.0, 2.0, 3.0};
+  weights.windows = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0};
+  weights.occluded = {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0};
+  const WholeMatch whole{0.1, 0.02, 0.2};
+  const WindowsMatch windows{0.7, 0.8, 0.4, 0.1};
+  EXPECT_NEAR(evidence_of(weights, whole), 1.0 + 2.0 * std::log(0.1) + 3.0 * std::log(0.02), 1e-12);
+  EXPECT_NEAR(evidence_of(weights, whole, windows),
+              1.0 + 2.0 * std::log(0.1) + 3.0 * std::log(0.02) + 4.0 * std::log(0.2) + 5.0 * 0.7 + 6.0 * 0.8 +
+                  7.0 * 0.4 + 8.0 * std::log(0.25),
+              1e-12);
+  EXPECT_NEAR(evidence_of(weights, OccludedMatch{windows, 0.3, 150.0, 0.1, 0.05}),
+              1.0 + 2.0 * 0.7 + 3.0 * 0.8 + 4.0 * 0.4 + 5.0 * std::log(0.25) + 6.0 * 0.3 + 7.0 * 1.5 +
+                  8.0 * 0.2 + 9.0 * 0.05,
+              1e-12);
+}
+
+TEST(Decision, TermsStayFiniteAtTheEdgesOfWhatIsMeasured) {
+  for (const double term : windows_terms({0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}))
+    EXPECT_TRUE(std::isfinite(term));
+  for (const double term : windows_terms({2.0, 2.0, 2.0}, {1.0, 1.0, 1.0, std::nullopt}))
+    EXPECT_TRUE(std::isfinite(term));
+}
+
+TEST(Decision, ObjectsFarAwayDoNotChangeTheEvidence) {
+  const WindowsMatch windows{0.7, 0.8, 0.4, 0.1};
+  EXPECT_EQ(windows_terms({0.1, 0.02, 0.4}, windows), windows_terms({0.1, 0.02, 1.9}, windows));
+  EXPECT_NE(windows_terms({0.1, 0.02, 0.2}, windows), windows_terms({0.1, 0.02, 0.1}, windows));
+}
+
+TEST(Decision, ConfidenceIsThePosteriorOfTheBestBesideTheSecondAndAnUnknownObject) {
+  EXPECT_DOUBLE_EQ(confidence_of(0.0, none), 0.5);
+  EXPECT_DOUBLE_EQ(confidence_of(0.0, 0.0), 1.0 / 3.0);
+  EXPECT_NEAR(confidence_of(3.0, 1.0), std::exp(3.0) / (std::exp(3.0) + std::exp(1.0) + 1.0), 1e-12);
+  EXPECT_DOUBLE_EQ(confidence_of(1e4, none), 1.0);
+  EXPECT_DOUBLE_EQ(confidence_of(-1e4, none), 0.0);
+  EXPECT_DOUBLE_EQ(confidence_of(1e4, 1e4), 0.5);
+}
+
+TEST(Decision, TheVerdictFollowsTheRequiredEvidenceAndTheLeadOverTheSecond) {
+  DecisionModel decision;
+  decision.required = 1.0;
+  EXPECT_EQ(verdict_of(decision, 0.99, none), Verdict::unknown);
+  EXPECT_EQ(verdict_of(decision, 1.0, none), Verdict::recognized);
+  EXPECT_EQ(verdict_of(decision, 5.0, 3.6), Verdict::ambiguous);
+  EXPECT_EQ(verdict_of(decision, 5.0, 3.4), Verdict::recognized);
+  EXPECT_EQ(verdict_of(decision, 1.2, 0.9), Verdict::recognized) << "the second would not be accepted itself";
+}
+
+TEST(Decision, ADistanceHasTheEvidenceItWasAskedFor) {
+  DecisionModel decision;
+  decision.weights.whole = {-5.0, -7.0, 3.0};
+  for (const double evidence : {-3.0, 0.0, 4.0}) {
+    const double distance = decision.distance_of(evidence, 0.02);
+    EXPECT_NEAR(evidence_of(decision.weights, WholeMatch{distance, 0.02}), evidence, 1e-9);
+  }
+  decision.weights.whole[1] = 0.0;
+  EXPECT_TRUE(std::isinf(decision.distance_of(0.0, 0.02)));
+}
+
+TEST(Decision, BothRatesFollowTheThreshold) {
+  DecisionModel decision;
+  decision.known = {1.0, 2.0, 3.0, 4.0};
+  decision.unknown = {-2.0, -1.0, 0.0, 3.5};
+  EXPECT_EQ(rates_at(decision, 2.5), (DecisionRates{0.5, 0.25}));
+  EXPECT_EQ(rates_at(decision, 3.5), (DecisionRates{0.75, 0.25})) << "as much evidence is enough";
+  EXPECT_EQ(rates_at(decision, -9.0), (DecisionRates{0.0, 1.0}));
+  EXPECT_EQ(rates_at({}, 0.0), (DecisionRates{0.0, 0.0}));
+  EXPECT_DOUBLE_EQ(decision.smallest_rate(), 0.2);
+  decision.set = {0.3, 0.1};
+  decision.expected = {0.25, 0.1};
+  EXPECT_FALSE(decision.gives_up_false_rejection());
+  decision.expected.false_rejection = 0.5;
+  EXPECT_TRUE(decision.gives_up_false_rejection());
+}
+
+}  // namespace
+}  // namespace eigenpose
