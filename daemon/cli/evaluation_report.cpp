@@ -6,7 +6,7 @@
 namespace eigenpose::cli {
 namespace {
 
-using json = nlohmann::ordered_json;
+using nlohmann::ordered_json;
 
 double milliseconds(Duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
@@ -16,11 +16,11 @@ double micro_per_view(Duration duration, std::size_t views) {
   return 1e3 * milliseconds(duration) / static_cast<double>(views);
 }
 
-json or_null(const std::optional<double>& value) {
-  return value ? json(*value) : json(nullptr);
+ordered_json or_null(const std::optional<double>& value) {
+  return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
-json scenes_json(const SceneReport& scenes) {
+ordered_json scenes_json(const SceneReport& scenes) {
   const auto pose = summarize_errors(scenes.pose_errors);
   return {{"scenes", scenes.scenes},
           {"objects", scenes.objects},
@@ -33,8 +33,8 @@ json scenes_json(const SceneReport& scenes) {
           {"pose_gross_rate", pose.gross_rate}};
 }
 
-json objects_json(const EvaluationReport& report) {
-  json objects = json::array();
+ordered_json objects_json(const EvaluationReport& report) {
+  ordered_json objects = ordered_json::array();
   for (const ObjectEvaluation& object : report.objects) {
     const auto errors = summarize_errors(object.pose_errors);
     const AnswerCounts& counts = object.counts;
@@ -64,8 +64,8 @@ std::string said_name(const EvaluationReport& report, const std::optional<std::s
   return said ? report.objects[*said].object : "(nothing)";
 }
 
-json confusions_json(const EvaluationReport& report) {
-  json confusions = json::array();
+ordered_json confusions_json(const EvaluationReport& report) {
+  ordered_json confusions = ordered_json::array();
   for (const auto& [pair, views] : count_confusions(report.records))
     confusions.push_back({{"object", report.objects[pair.first].object},
                           {"said", said_name(report, pair.second)},
@@ -73,7 +73,7 @@ json confusions_json(const EvaluationReport& report) {
   return confusions;
 }
 
-void add_learning_json(const EvaluationReport& report, json& result) {
+void add_learning_json(const EvaluationReport& report, ordered_json& result) {
   result["smallest_rejection_rate"] = report.smallest_rate;
   result["model_bytes_per_object"] = report.model_bytes;
   result["learned_views"] = report.learning.views;
@@ -82,7 +82,7 @@ void add_learning_json(const EvaluationReport& report, json& result) {
   result["energy_kept"] = report.learning.solver.energy;
 }
 
-void add_times_json(const EvaluationReport& report, json& result) {
+void add_times_json(const EvaluationReport& report, ordered_json& result) {
   result["times_ms"] = {{"normalize", milliseconds(report.learning.normalize_time)},
                         {"eigenspace", milliseconds(report.learning.eigenspace_time)},
                         {"manifolds", milliseconds(report.learning.manifold_time)},
@@ -161,10 +161,10 @@ nlohmann::ordered_json evaluation_json(const EvaluationReport& report,
                                        const std::optional<Reliability>& confidence) {
   const AnswerCounts& counts = report.counts;
   const auto pose = report.pose_errors();
-  json result = {{"answered_right_rate", counts.answered_right_rate()},
-                 {"answered_wrong_rate", counts.answered_wrong_rate()},
-                 {"withheld_rate", counts.withheld_rate()},
-                 {"false_acceptance_rate", or_null(counts.false_acceptance_rate())}};
+  ordered_json result = {{"answered_right_rate", counts.answered_right_rate()},
+                         {"answered_wrong_rate", counts.answered_wrong_rate()},
+                         {"withheld_rate", counts.withheld_rate()},
+                         {"false_acceptance_rate", or_null(counts.false_acceptance_rate())}};
   if (confidence) result["expected_calibration_error"] = confidence->expected_calibration_error;
   result["recognition_rate"] = counts.recognition_rate();
   result["pose_error_mean_deg"] = pose.mean;
@@ -175,7 +175,7 @@ nlohmann::ordered_json evaluation_json(const EvaluationReport& report,
   result["ambiguous_rate"] = counts.ambiguous_rate();
   result["test_views"] = counts.known;
   result["unknown_views"] = counts.unknown;
-  result["scenes"] = report.scenes ? scenes_json(*report.scenes) : json(nullptr);
+  result["scenes"] = report.scenes ? scenes_json(*report.scenes) : ordered_json(nullptr);
   add_learning_json(report, result);
   result["objects"] = objects_json(report);
   result["confusions"] = confusions_json(report);
