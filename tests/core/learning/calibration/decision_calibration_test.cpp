@@ -63,7 +63,7 @@ TEST(DecisionCalibration, OneObjectHasTheThresholdThatLogOddsMean) {
   std::vector<Probe> probes;
   for (int i = 0; i < 40; ++i) probes.push_back({0, 0, true, false, {0.001, 0.001, 0.3}, {}, {}});
   const DecisionModel decision = calibrate_decision(probes, {0.001, 0.01});
-  EXPECT_GE(decision.required, std::log(100.0) - 1e-9);
+  EXPECT_GE(decision.required, 0.5 * std::log(100.0) - 1e-9);
   EXPECT_EQ(decision.weights.whole, prior_weights().whole) << "there is nothing to learn them from";
 }
 
