@@ -10,7 +10,7 @@
 /// beyond its lowest (highest) twentieth by an exponential tail, as a few hundred probes do not show one in a
 /// thousand. Where both rates can be held, the threshold is the one of false rejections. Where not, that of
 /// false acceptances wins: a wrong name is worse than none. A log-odds bounds the rate of false acceptances
-/// by itself, P(Λ > t | unknown) ≤ e^−t, which decides where there are few unknown probes.
+/// by itself, P(Λ > t | unknown) ≤ e^−t; half of that t decides where there are few unknown probes.
 
 #include <optional>
 #include <span>
