@@ -148,7 +148,7 @@ void calibrate(const Run& run, const TrainingViews& views, const Eigen::MatrixXd
   ProbeOptions probe;
   yardstick.threads = probe.threads = run.options.threads;
   // Without alignment, misalignment adds to every distance: what segmentation causes on average.
-  if (!parts) yardstick.perturbation = probe.perturbation = {.shift = 0.015, .scale = 0.03, .turn_deg = 1.5};
+  if (!parts) yardstick.perturbation = {.shift = 0.015, .scale = 0.03, .turn_deg = 1.5};
   const Yardsticks yardsticks = measure_yardsticks(model, views, points, yardstick, run.progress, run.stop);
   for (std::size_t o = 0; o < model.objects.size(); ++o)
     model.objects[o].typical_distance = yardsticks.typical_distance[o];

@@ -20,7 +20,8 @@ namespace {
 /// Standard deviation of a weight before any view was seen, as a share of it; and the least.
 constexpr double prior_spread = 0.5;
 constexpr double least_spread = 0.5;
-/// Views of one object are alike: they count as so many that are not.
+/// Views of one object are correlated: however many there are, they weigh as much as so many independent
+/// ones.
 constexpr double views_that_differ = 5.0;
 /// Shares of the false acceptances that may be settled by the whole region alone, and that may be taken for
 /// occluded objects.
@@ -31,14 +32,17 @@ constexpr std::size_t enough_objects = 8;
 /// Of the evidence that log-odds ask for, the share that few objects need: with models of 1, 2, 4 and 8 of 50
 /// objects, of 3000 views of the others none had more than 1.2 where a rate of 1 % asks for 4.6.
 constexpr double few_objects_share = 0.5;
-/// Rejected views must be among those that the windows decide: so many times more are left to them.
+/// A rejected view must not have been settled by the whole region alone: of the known views, this many times
+/// the rate of false rejections are left to the windows.
 constexpr double left_to_windows = 2.0;
 
 /// Two objects are alike where half of the views of one, as the other, have more evidence than this share of
 /// its views have as themselves.
 constexpr double alike_share = 0.25;
-/// A tail is told by at least so many numbers.
+/// The fewest samples that an exponential tail is fitted to.
 constexpr std::size_t least_tail = 10;
+/// Rates below this are held as this: no number of views shows that something never happens.
+constexpr double least_rate = 1e-6;
 /// Less evidence than this is no evidence at all.
 constexpr double least_evidence = -30.0;
 
@@ -108,7 +112,6 @@ double lower_tail(const std::vector<double>& rising, double rate) {
     const auto rank = static_cast<std::size_t>(rate * (n + 1.0));
     return rising[std::min(rank, rising.size()) - 1];
   }
-  if (rate <= 0.0) return -infinity;
   const double begin = rising[tail - 1];
   double excess = 0.0;
   for (std::size_t i = 0; i < tail; ++i) excess += begin - std::max(rising[i], least_evidence);
@@ -132,7 +135,7 @@ std::vector<double> sorted_evidence(const Probes& probes, const auto& wanted, co
 
 /// The evidence that unknown regions reach at the rate, by what was seen of them, and by what log-odds mean.
 double accepted_at(const std::vector<double>& unknown, double rate, std::size_t objects) {
-  const double by_odds = rate > 0.0 ? -few_objects_share * std::log(rate) : infinity;
+  const double by_odds = -few_objects_share * std::log(rate);
   if (unknown.empty()) return by_odds;
   const double seen = upper_tail(unknown, rate);
   if (objects >= enough_objects) return seen;
@@ -234,12 +237,13 @@ DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRa
     windows = windows || probe.windows;
   }
   DecisionModel decision;
-  decision.set = rates;
+  decision.set = {std::max(rates.false_rejection, least_rate), std::max(rates.false_acceptance, least_rate)};
   decision.weights = prior_weights();
   leave_out_twins(decision, used);
   decision.weights = fit_weights(used, static_cast<double>(objects.size()));
   set_settled(used, objects.size(), decision);
   set_required(used, windows, objects.size(), decision);
+  decision.set = rates;
   return decision;
 }
 

@@ -12,7 +12,7 @@ namespace eigenpose {
 struct LogisticSamples {
   Eigen::MatrixXd terms;       ///< one column a sample
   std::vector<bool> positive;  ///< one a sample
-  double most_weight = 1e9;    ///< the samples of a class together count as at most so many
+  double most_weight = 1e9;    ///< bound on the total weight of each class, in samples
 };
 
 /// The weights w of log-odds w·φ that are most probable where each is normal about its prior mean (maximum a

@@ -40,7 +40,7 @@ class Prober {
     return views_.picture(views_.objects()[view.object].first + view.view);
   }
   [[nodiscard]] cv::Mat perturbed(const View& view) const {
-    return displaced(learned(view), perturbation_of(options_.perturbation, view.object, view.view));
+    return displaced(learned(view), perturbation_of(yardsticks_.perturbation, view.object, view.view));
   }
   [[nodiscard]] Probe known_probe(const View& view) const;
   [[nodiscard]] std::optional<Probe> unknown_probe(const View& view);
@@ -77,8 +77,7 @@ std::optional<Probe> Prober::unknown_probe(const View& view) {
   if (!nearest) return std::nullopt;
   Probe probe{view.object, *nearest, false};
   const RealignedDistance distance = shown_.distance(*nearest, view.object);
-  probe.whole = {distance.own, model_.objects[*nearest].typical_distance};
-  if (distance.other) probe.whole.other = distance.other->distance;
+  probe.whole = whole_match(model_, *nearest, distance);
   return probe;
 }
 

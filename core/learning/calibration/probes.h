@@ -46,7 +46,6 @@ struct Probe {
 };
 
 struct ProbeOptions {
-  Perturbation perturbation{.shift = 2.0 / 128.0, .scale = 0.03, .turn_deg = 3.0};
   std::size_t shown = 400;    ///< views shown to the windows, of all objects together
   std::size_t hidden = 150;   ///< of these, views shown with a part hidden
   double hidden_share = 0.2;  ///< of the picture

@@ -152,6 +152,7 @@ Yardsticks measure_yardsticks(const Model& model, const TrainingViews& views, co
     for (const ViewDistance& view : own) missed.push_back(view.missed);
   const double growth = error_growth(missed);
   Yardsticks result;
+  result.perturbation = options.perturbation;
   for (const auto& own : distances) {
     std::vector<double> squared;
     for (const ViewDistance& view : own)

@@ -25,6 +25,7 @@ struct YardstickOptions {
 
 /// What the views of all objects say.
 struct Yardsticks {
+  Perturbation perturbation;  ///< that the views were shown with
   /// For each object and view the squared distance that a new view there is expected to have.
   std::vector<std::vector<double>> squared;
   std::vector<double> typical_distance;   ///< one an object: root mean square of new views

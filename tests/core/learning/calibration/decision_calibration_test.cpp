@@ -121,6 +121,24 @@ TEST(DecisionCalibration, OccludedUnknownViewsReachTheThresholdAtMostAtTheirShar
   EXPECT_LE(accepted / shown, 0.05);
 }
 
+TEST(DecisionCalibration, IsFiniteAtEveryRateThatMayBeSet) {
+  auto probes = drawn(20, 30, 6.0);
+  for (Probe& probe : probes) {
+    probe.windows = WindowsProbe{probe.taken_for, probe.whole, {probe.known ? 0.8 : 0.4, 0.8, 0.3, 0.1}};
+    probe.occluded = OccludedMatch{{0.5, 0.8, 0.3, 0.1}, 0.3, 20.0, 0.2, 0.05};
+  }
+  for (const double rejection : {0.0, 0.5})
+    for (const double acceptance : {0.0, 1.0})
+      for (const std::size_t shown : {probes.size(), std::size_t{2}, std::size_t{1}}) {
+        const DecisionRates rates{rejection, acceptance};
+        const DecisionModel decision = calibrate_decision(std::span(probes).first(shown), rates);
+        EXPECT_TRUE(std::isfinite(decision.required)) << rejection << " " << acceptance << " " << shown;
+        EXPECT_TRUE(std::isfinite(decision.settled));
+        for (const double weight : decision.weights.occluded) EXPECT_TRUE(std::isfinite(weight));
+        EXPECT_EQ(decision.set, rates) << "what was set is kept as it was";
+      }
+}
+
 TEST(DecisionCalibration, RefusesRatesThatAreNone) {
   EXPECT_THROW(calibrate_decision({}, {-0.1, 0.1}), std::invalid_argument);
   EXPECT_THROW(calibrate_decision({}, {0.6, 0.1}), std::invalid_argument);
