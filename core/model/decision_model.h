@@ -38,8 +38,8 @@ struct Tuning {
   /// logarithm).
   double settled_lead = 3.0;
   /// It is ambiguous which of two objects a region shows when the second is at most this much less likely:
-  /// ln(0.82/0.18).
-  double ambiguous_lead = 1.5;
+  /// ln(0.7/0.3).
+  double ambiguous_lead = 0.847;
   /// Windows cannot tell two objects apart when the second has at least this share of the first's votes: then
   /// the distance of the whole region does.
   double tied_votes = 0.97;

@@ -13,33 +13,10 @@ namespace {
 
 /// Other objects farther than this are no rivals, and terms of the evidence do not depend on them.
 constexpr double reach_of_others = 0.5;
-/// Objects with most votes that are compared with the whole region.
-constexpr std::size_t most_voted = 2;
-
-/// Whether the windows see as much of one as of the other.
-bool tied(const DecisionModel& decision, const WholeCandidate& a, const WholeCandidate& b) {
-  const auto [less, more] = std::minmax(a.windows.votes, b.windows.votes);
-  return less >= decision.tuning.tied_votes * more;
-}
-
-/// Log-odds of one object over another. Where windows see as much of both, distances are compared: of a view
-/// of the object they are normal, with the variance of the typical one over the effective dimensions.
-double lead_of(const Model& model, const WholeCandidate& best, const WholeCandidate& second) {
-  if (!tied(model.decision, best, second)) return best.evidence - second.evidence;
-  const auto squared = [](const WholeCandidate& candidate) {
-    return candidate.distance.own * candidate.distance.own;
-  };
-  const double typical = std::max(model.objects[best.object].typical_distance, least_distance);
-  return 0.5 * model.decision.tuning.effective_dimensions * (squared(second) - squared(best)) /
-         (typical * typical);
-}
-
-/// The evidence for an object as if none of the others resembled the region.
-double evidence_without_rival(const Model& model, const WholeCandidate& candidate) {
-  const WholeMatch whole{candidate.distance.own, model.objects[candidate.object].typical_distance};
-  WindowsMatch windows = candidate.windows;
-  windows.next.reset();
-  return evidence_of(model.decision.weights, whole, windows);
+/// Whether the windows see about as much of one object as of the other.
+bool tied(const Model& model, const WholeCandidate& a, const WholeCandidate& b) {
+  const auto [less, more] = std::minmax(a.windows.discriminating, b.windows.discriminating);
+  return less >= model.decision.tuning.tied_votes * more;
 }
 
 }  // namespace
@@ -50,29 +27,40 @@ WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDi
   return match;
 }
 
+WholeCandidate align_whole(const PartsRecognizer::Look& look, AlignedMatch& match, const WholeRegion& region,
+                           std::size_t object) {
+  const AlignedPose& pose = match.align(look.pose_picture(), object).front();
+  WholeCandidate candidate{object, pose.q, pose.misalignment, {}, {}, 0.0};
+  candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
+  return candidate;
+}
+
+double lead_of(const Model& model, const WholeCandidate& first, const WholeCandidate& second) {
+  double lead = QueryWindows::count * (first.windows.discriminating - second.windows.discriminating);
+  if (tied(model, first, second)) {
+    const double typical = std::max(model.objects[first.object].typical_distance, least_distance);
+    const double farther =
+        second.distance.own * second.distance.own - first.distance.own * first.distance.own;
+    lead += 0.5 * model.decision.tuning.effective_dimensions * farther / (typical * typical);
+  }
+  return lead;
+}
+
 WholeCandidates compare_whole(const Model& model, const PartsRecognizer::Look& look,
                               const PartsRecognizer::Votes& votes, AlignedMatch& match,
-                              const WholeRegion& region) {
+                              const WholeRegion& region, const WholeCandidate& aligned) {
   WholeCandidates candidates;
-  const auto add = [&](std::size_t object) {
-    if (std::ranges::find(candidates, object, &WholeCandidate::object) != candidates.end()) return;
-    WholeCandidate candidate;
-    candidate.object = object;
-    candidate.misalignment = match.align(look.pose_picture(), object).front().misalignment;
-    candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
-    candidate.windows = votes.match(object);
-    candidate.evidence = evidence_of(model.decision.weights, whole_match(model, object, candidate.distance),
-                                     candidate.windows);
+  for (const PartialVote& vote : votes.ranked()) {
+    if (candidates.full()) break;
+    if (vote.object == region.absent || (vote.score <= 0.0F && !candidates.empty())) continue;
+    WholeCandidate candidate =
+        vote.object == aligned.object ? aligned : align_whole(look, match, region, vote.object);
+    candidate.windows = votes.match(vote.object);
+    candidate.evidence = evidence_of(model.decision.weights,
+                                     whole_match(model, vote.object, candidate.distance), candidate.windows);
     candidates.push_back(candidate);
-  };
-  add(region.nearest);
-  const auto ranked = votes.ranked();
-  for (std::size_t i = 0; i < std::min(most_voted, ranked.size()); ++i)
-    if (ranked[i].score > 0.0F && ranked[i].object != region.absent) add(ranked[i].object);
-  insertion_sort(candidates,
-                 [](const WholeCandidate& a, const WholeCandidate& b) { return a.evidence > b.evidence; });
-  if (candidates.size() > 1 && tied(model.decision, candidates[0], candidates[1]) &&
-      candidates[1].distance.own < candidates[0].distance.own)
+  }
+  if (candidates.full() && lead_of(model, candidates[0], candidates[1]) < 0.0)
     std::swap(candidates[0], candidates[1]);
   return candidates;
 }
@@ -109,16 +97,19 @@ bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<
 std::size_t PartsStage::judge(std::span<const float> picture, std::size_t nearest, Outcome& outcome) {
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   const PartsRecognizer::Look look = recognizer_.look(picture_);
-  return settle(look, picture, nearest, outcome) ? nearest : vote(look, picture, nearest, outcome);
+  const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), nearest);
+  WholeCandidate candidate{nearest, aligned.front().q, aligned.front().misalignment, {}, {}, 0.0};
+  candidate.distance = match_.distance(picture, candidate.misalignment, {nearest});
+  return settle(look, aligned, candidate, outcome) ? nearest : vote(look, picture, candidate, outcome);
 }
 
-bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t object,
-                        Outcome& outcome) {
+bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const AlignedPose> aligned,
+                        const WholeCandidate& nearest, Outcome& outcome) {
   const DecisionModel& decision = model_.decision;
-  const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), object);
+  const std::size_t object = nearest.object;
   Finding finding;
   finding.object = object;
-  finding.distance = match_.distance(picture, aligned.front().misalignment, {object});
+  finding.distance = nearest.distance;
   finding.evidence = evidence_of(decision.weights, whole_match(model_, object, finding.distance));
   if (finding.evidence < decision.settled) return false;
   if (const auto& other = finding.distance.other)
@@ -148,9 +139,9 @@ bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const float
 }
 
 std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const float> picture,
-                             std::size_t nearest, Outcome& outcome) {
+                             const WholeCandidate& nearest, Outcome& outcome) {
   const PartsRecognizer::Votes votes = look.vote();
-  const WholeCandidates candidates = compare_whole(model_, look, votes, match_, {picture, nearest, {}});
+  const WholeCandidates candidates = compare_whole(model_, look, votes, match_, {picture, {}}, nearest);
   const WholeCandidate& best = candidates.front();
   if (best.evidence < model_.decision.required) {
     const auto found = identify_if_occluded(model_, votes);
@@ -166,18 +157,11 @@ std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const 
   finding.distance = best.distance;
   finding.occluded = answer.occluded;
   finding.evidence = best.evidence;
-  if (candidates.size() > 1) {
-    const double lead = lead_of(model_, best, candidates[1]);
-    // That it is one of two is not in doubt because they are alike.
-    if (lead < model_.decision.tuning.ambiguous_lead)
-      finding.evidence = std::max(best.evidence, evidence_without_rival(model_, best));
-    finding.second_evidence = finding.evidence - lead;
-  }
+  if (candidates.full()) finding.second_evidence = best.evidence - lead_of(model_, best, candidates[1]);
   describe(finding, outcome);
-  if (candidates.size() > 1) {
+  if (candidates.full()) {
     const WholeCandidate& second = candidates[1];
-    pool_.fill(outcome.runner_up, model_.objects[second.object].name,
-               match_.align(look.pose_picture(), second.object).front().q, second.distance.own);
+    pool_.fill(outcome.runner_up, model_.objects[second.object].name, second.q, second.distance.own);
   }
   return best.object;
 }

@@ -21,17 +21,18 @@
 
 namespace eigenpose {
 
-/// One object that a region may show, compared with all of it.
+/// One object that a region may show, aligned and compared with all of it.
 struct WholeCandidate {
   std::size_t object = 0;
-  Misalignment misalignment;  ///< of its best pose
+  PoseVector q;               ///< its best pose
+  Misalignment misalignment;  ///< of that pose
   RealignedDistance distance;
-  WindowsMatch windows;
-  double evidence = -std::numeric_limits<double>::infinity();
+  WindowsMatch windows;   ///< once the windows have voted
+  double evidence = 0.0;  ///< likewise
 };
 
-/// The candidates of one region, most evidence first.
-using WholeCandidates = BoundedVector<WholeCandidate, 3>;
+/// The one or two candidates of a region, the more likely first.
+using WholeCandidates = BoundedVector<WholeCandidate, 2>;
 
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
@@ -68,12 +69,13 @@ class PartsStage {
     double second_evidence = -std::numeric_limits<double>::infinity();
   };
 
-  /// The decision by the whole region alone; nothing where it leaves a doubt.
-  bool settle(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t object,
-              Outcome& outcome);
+  /// The decision by the whole region alone, where it leaves no doubt. @param nearest with its `aligned`
+  /// poses.
+  bool settle(const PartsRecognizer::Look& look, std::span<const AlignedPose> aligned,
+              const WholeCandidate& nearest, Outcome& outcome);
   /// Decides by the windows as well. @return the object.
-  std::size_t vote(const PartsRecognizer::Look& look, std::span<const float> picture, std::size_t nearest,
-                   Outcome& outcome);
+  std::size_t vote(const PartsRecognizer::Look& look, std::span<const float> picture,
+                   const WholeCandidate& nearest, Outcome& outcome);
   /// Fills everything of `outcome` but its box.
   void describe(const Finding& finding, Outcome& outcome);
   void describe_occluded(const PartsIdentification& found, std::span<const float> picture, Outcome& outcome);
@@ -91,15 +93,24 @@ class PartsStage {
 /// A region as the whole-region match takes it.
 struct WholeRegion {
   std::span<const float> picture;     ///< as the normaliser makes it
-  std::size_t nearest = 0;            ///< the object whose manifold is nearest, without alignment
   std::optional<std::size_t> absent;  ///< an object that counts as not learned
 };
 
-/// The objects that a region may show as a whole: the nearest, and those with most votes; aligned, compared
-/// and sorted by evidence.
+/// Aligns a region with an object, and measures the distance after alignment.
+WholeCandidate align_whole(const PartsRecognizer::Look& look, AlignedMatch& match, const WholeRegion& region,
+                           std::size_t object);
+
+/// The two objects with most votes, compared with the whole region. The windows choose between them; where
+/// they see about as much of both, the distance does. @param aligned a candidate that need not be aligned
+/// again.
 WholeCandidates compare_whole(const Model& model, const PartsRecognizer::Look& look,
                               const PartsRecognizer::Votes& votes, AlignedMatch& match,
-                              const WholeRegion& region);
+                              const WholeRegion& region, const WholeCandidate& aligned);
+
+/// Log-odds of the first of two candidates over the second: n·(b₁ − b₂), with n windows as independent
+/// observations and b their discriminating votes; where these are tied, and the squared distances in units of
+/// their variance, e·(d₂² − d₁²)/2s², with e effective dimensions.
+double lead_of(const Model& model, const WholeCandidate& first, const WholeCandidate& second);
 
 /// The object of a region that may be partly occluded: some windows of the object with most votes are
 /// foreign, not too many, and masking explains the region much better. Nothing otherwise.

@@ -43,9 +43,8 @@ class Prober {
     return displaced(learned(view), perturbation_of(yardsticks_.perturbation, view.object, view.view));
   }
   [[nodiscard]] Probe known_probe(const View& view) const;
-  [[nodiscard]] std::optional<Probe> unknown_probe(const View& view);
   void show_known(const View& view, const cv::Mat& picture, Probe& probe);
-  void show_unknown(const View& view, const cv::Mat& picture, Probe& probe);
+  void show_unknown(const View& view, To to, std::vector<Probe>& probes);
   /// The occluded match, where some of the windows are foreign.
   [[nodiscard]] std::optional<OccludedMatch> match_occluded(const PartsRecognizer::Votes& votes) const;
   /// The views of an object, all of them.
@@ -72,15 +71,6 @@ Probe Prober::known_probe(const View& view) const {
   return probe;
 }
 
-std::optional<Probe> Prober::unknown_probe(const View& view) {
-  const auto nearest = shown_.nearest(view.object);
-  if (!nearest) return std::nullopt;
-  Probe probe{view.object, *nearest, false};
-  const RealignedDistance distance = shown_.distance(*nearest, view.object);
-  probe.whole = whole_match(model_, *nearest, distance);
-  return probe;
-}
-
 std::optional<OccludedMatch> Prober::match_occluded(const PartsRecognizer::Votes& votes) const {
   const auto found = identify_if_occluded(model_, votes);
   return found ? std::optional(found->match) : std::nullopt;
@@ -102,14 +92,27 @@ void Prober::show_known(const View& view, const cv::Mat& picture, Probe& probe) 
   probe.windows = {view.object, probe.whole, expected};
 }
 
-void Prober::show_unknown(const View& view, const cv::Mat& picture, Probe& probe) {
-  const PartsRecognizer::Look look = recognizer_->look(picture);
-  const PartsRecognizer::Votes votes = look.vote().without(view.object, all_views(view.object));
-  const WholeCandidates candidates = compare_whole(model_, look, votes, shown_.aligned_match(),
-                                                   {shown_.numbers(), probe.taken_for, view.object});
-  const WholeCandidate& best = candidates.front();
-  probe.windows = {best.object, whole_match(model_, best.object, best.distance), best.windows};
-  probe.occluded = match_occluded(votes);
+void Prober::show_unknown(const View& view, To to, std::vector<Probe>& probes) {
+  // Misalignment makes an unknown object less like the learned ones: without it is the harder case.
+  const cv::Mat picture = learned(view);
+  shown_.show(picture);
+  const auto nearest = shown_.nearest(view.object);
+  if (!nearest) return;
+  Probe probe{view.object, *nearest, false};
+  if (to == To::whole) {
+    probe.whole = whole_match(model_, *nearest, shown_.distance(*nearest, view.object));
+  } else {
+    const PartsRecognizer::Look look = recognizer_->look(picture);
+    const WholeRegion region{shown_.numbers(), view.object};
+    const WholeCandidate aligned = align_whole(look, shown_.aligned_match(), region, *nearest);
+    probe.whole = whole_match(model_, *nearest, aligned.distance);
+    const PartsRecognizer::Votes votes = look.vote().without(view.object, all_views(view.object));
+    const WholeCandidate best =
+        compare_whole(model_, look, votes, shown_.aligned_match(), region, aligned).front();
+    probe.windows = {best.object, whole_match(model_, best.object, best.distance), best.windows};
+    probe.occluded = match_occluded(votes);
+  }
+  probes.push_back(probe);
 }
 
 void Prober::show(const View& view, To to, std::vector<Probe>& probes) {
@@ -118,13 +121,7 @@ void Prober::show(const View& view, To to, std::vector<Probe>& probes) {
   Probe known = known_probe(view);
   if (to == To::windows) show_known(view, as_new, known);
   probes.push_back(known);
-  // Misalignment makes an unknown object less like the learned ones: without it is the harder case.
-  const cv::Mat as_unknown = learned(view);
-  shown_.show(as_unknown);
-  std::optional<Probe> unknown = unknown_probe(view);
-  if (!unknown) return;
-  if (to == To::windows) show_unknown(view, as_unknown, *unknown);
-  probes.push_back(*unknown);
+  show_unknown(view, to, probes);
 }
 
 void Prober::show_hidden(const View& view, std::vector<Probe>& probes) {

@@ -57,8 +57,8 @@ TEST(Decision, TheVerdictFollowsTheRequiredEvidenceAndTheLeadOverTheSecond) {
   decision.required = 1.0;
   EXPECT_EQ(verdict_of(decision, 0.99, none), Verdict::unknown);
   EXPECT_EQ(verdict_of(decision, 1.0, none), Verdict::recognized);
-  EXPECT_EQ(verdict_of(decision, 5.0, 3.6), Verdict::ambiguous);
-  EXPECT_EQ(verdict_of(decision, 5.0, 3.4), Verdict::recognized);
+  EXPECT_EQ(verdict_of(decision, 5.0, 4.2), Verdict::ambiguous);
+  EXPECT_EQ(verdict_of(decision, 5.0, 4.1), Verdict::recognized);
   EXPECT_EQ(verdict_of(decision, 1.2, 0.9), Verdict::recognized) << "the second would not be accepted itself";
 }
 
