@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/recognition/decision.h"
+
 namespace eigenpose {
 
 std::string_view verdict_name(Verdict verdict) {
@@ -22,10 +24,18 @@ std::string_view verdict_name(Verdict verdict) {
   return "unknown";
 }
 
-Verdict verdict_of(const DecisionModel& decision, double evidence, double second) {
-  if (evidence < decision.required) return Verdict::unknown;
-  const bool two = second > evidence - decision.tuning.ambiguous_lead && second >= decision.required;
+Verdict verdict_of(const Evidence& evidence, const Tuning& tuning) {
+  if (evidence.best < evidence.required) return Verdict::unknown;
+  const bool two =
+      evidence.second > evidence.best - tuning.ambiguous_lead && evidence.second >= evidence.required;
   return two ? Verdict::ambiguous : Verdict::recognized;
+}
+
+void Outcome::decide(const Evidence& by, const Tuning& tuning) {
+  verdict = verdict_of(by, tuning);
+  evidence = by.best;
+  required_evidence = by.required;
+  confidence = confidence_of(by.best, by.second);
 }
 
 void Outcome::set_covariance(std::span<const double> covariance, double scale,

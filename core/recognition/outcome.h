@@ -2,6 +2,7 @@
 
 /// The result of recognition for one region of a picture.
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -26,8 +27,15 @@ enum class Verdict {
 /// "recognized", "unknown", "ambiguous", "touches_border", "too_small": stable names used in JSON.
 std::string_view verdict_name(Verdict verdict);
 
-/// The decision. @param evidence for the best object, @param second for the next; −∞ without.
-Verdict verdict_of(const DecisionModel& decision, double evidence, double second);
+/// Log-odds against an unknown object.
+struct Evidence {
+  double best = 0.0;                                         ///< for the best object
+  double second = -std::numeric_limits<double>::infinity();  ///< for the next, if there is any
+  double required = 0.0;                                     ///< with less the region is unknown
+};
+
+/// The decision.
+Verdict verdict_of(const Evidence& evidence, const Tuning& tuning);
 
 /// One object and pose that fits a region.
 struct Hypothesis {
@@ -66,6 +74,8 @@ struct Outcome {
   /// others.
   bool unfinished = false;
 
+  /// Sets verdict, evidence, required_evidence and confidence.
+  void decide(const Evidence& by, const Tuning& tuning);
   /// Sets q_covariance to the m × m values of `covariance` times `scale`, and q_sigma. A DOF that is not
   /// `observable` gets an infinite variance and no covariance with others.
   void set_covariance(std::span<const double> covariance, double scale, const std::vector<bool>& observable);

@@ -110,12 +110,13 @@ bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const Align
   Finding finding;
   finding.object = object;
   finding.distance = nearest.distance;
-  finding.evidence = evidence_of(decision.weights, whole_match(model_, object, finding.distance));
-  if (finding.evidence < decision.settled) return false;
+  finding.evidence = {.best = evidence_of(decision.weights, whole_match(model_, object, finding.distance)),
+                      .required = decision.required};
+  if (finding.evidence.best < decision.settled) return false;
   if (const auto& other = finding.distance.other)
-    finding.second_evidence = evidence_of(
+    finding.evidence.second = evidence_of(
         decision.weights, WholeMatch{other->distance, model_.objects[other->manifold].typical_distance});
-  if (finding.second_evidence > finding.evidence - decision.tuning.settled_lead) return false;
+  if (finding.evidence.second > finding.evidence.best - decision.tuning.settled_lead) return false;
   poses_.clear();
   bool clear = true;
   for (const AlignedPose& found : aligned) {
@@ -146,7 +147,7 @@ std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const 
   if (best.evidence < model_.decision.required) {
     const auto found = identify_if_occluded(model_, votes);
     if (found && found->evidence > best.evidence) {
-      describe_occluded(*found, picture, outcome);
+      describe_occluded(*found, picture, model_.decision.required, outcome);
       return found->best.object;
     }
   }
@@ -156,8 +157,8 @@ std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const 
   finding.poses = answer.poses;
   finding.distance = best.distance;
   finding.occluded = answer.occluded;
-  finding.evidence = best.evidence;
-  if (candidates.full()) finding.second_evidence = best.evidence - lead_of(model_, best, candidates[1]);
+  finding.evidence = {.best = best.evidence, .required = model_.decision.required};
+  if (candidates.full()) finding.evidence.second = best.evidence - lead_of(model_, best, candidates[1]);
   describe(finding, outcome);
   if (candidates.full()) {
     const WholeCandidate& second = candidates[1];
@@ -167,13 +168,11 @@ std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const 
 }
 
 void PartsStage::describe(const TouchingObject& object, Outcome& outcome) {
-  describe_occluded(object.found, object.picture, outcome);
-  // Whether it is accepted was decided with the others of its region.
-  if (outcome.verdict == Verdict::unknown) outcome.verdict = Verdict::recognized;
+  describe_occluded(object.found, object.picture, object.required, outcome);
 }
 
 void PartsStage::describe_occluded(const PartsIdentification& found, std::span<const float> picture,
-                                   Outcome& outcome) {
+                                   double required, Outcome& outcome) {
   const auto distance_of = [&](const PartsAnswer& answer) {
     return match_.distance(picture, answer.poses.front().misalignment, {answer.object});
   };
@@ -182,8 +181,7 @@ void PartsStage::describe_occluded(const PartsIdentification& found, std::span<c
   finding.poses = found.best.poses;
   finding.distance = distance_of(found.best);
   finding.occluded = found.best.occluded;
-  finding.evidence = found.evidence;
-  finding.second_evidence = found.second_evidence;
+  finding.evidence = {found.evidence, found.second_evidence, required};
   describe(finding, outcome);
   if (found.second)
     pool_.fill(outcome.runner_up, model_.objects[found.second->object].name, found.second->poses.front().q,
@@ -195,9 +193,7 @@ void PartsStage::describe(const Finding& finding, Outcome& outcome) {
   const ModelObject& object = model_.objects[finding.object];
   const PartsPose& best = finding.poses.front();
   pool_.fill(outcome.best, object.name, best.q, finding.distance.own);
-  outcome.evidence = finding.evidence;
-  outcome.required_evidence = decision.required;
-  outcome.confidence = confidence_of(finding.evidence, finding.second_evidence);
+  outcome.decide(finding.evidence, decision.tuning);
   outcome.covered_share = finding.occluded;
   outcome.set_covariance(best.q_covariance, decision.tuning.sigma_inflation * decision.tuning.sigma_inflation,
                          object.dof_observable);
@@ -206,7 +202,6 @@ void PartsStage::describe(const Finding& finding, Outcome& outcome) {
     pool_.fill(outcome.runner_up, second.name, std::span(other->q).first(second.workspace.size()),
                other->distance);
   }
-  outcome.verdict = verdict_of(decision, finding.evidence, finding.second_evidence);
   if (outcome.verdict == Verdict::unknown) return;
   for (const PartsPose& pose : finding.poses.subspan(1)) {
     if (pose.merit > best.merit - decision.tuning.pose_lead && apart(finding.object, pose.q, best.q)) {

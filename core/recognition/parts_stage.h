@@ -65,8 +65,7 @@ class PartsStage {
     std::span<const PartsPose> poses;  ///< of the object, best first
     RealignedDistance distance;
     double occluded = 0.0;
-    double evidence = 0.0;
-    double second_evidence = -std::numeric_limits<double>::infinity();
+    Evidence evidence;
   };
 
   /// The decision by the whole region alone, where it leaves no doubt. @param nearest with its `aligned`
@@ -78,7 +77,9 @@ class PartsStage {
                    const WholeCandidate& nearest, Outcome& outcome);
   /// Fills everything of `outcome` but its box.
   void describe(const Finding& finding, Outcome& outcome);
-  void describe_occluded(const PartsIdentification& found, std::span<const float> picture, Outcome& outcome);
+  /// @param required the evidence that is asked of it.
+  void describe_occluded(const PartsIdentification& found, std::span<const float> picture, double required,
+                         Outcome& outcome);
   [[nodiscard]] bool apart(std::size_t object, std::span<const double> a, std::span<const double> b) const;
 
   const Model& model_;

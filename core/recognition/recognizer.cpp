@@ -232,12 +232,9 @@ void Recognizer::Impl::judge(Outcome& outcome) {
   };
   describe(outcome.best, best);
   if (closest_count > 1) describe(outcome.runner_up, closest[1]);
-  outcome.evidence = evidence_at(best.distance, best.manifold);
-  outcome.required_evidence = decision.required;
-  const double second = closest_count > 1 ? evidence_at(closest[1].distance, closest[1].manifold)
-                                          : -std::numeric_limits<double>::infinity();
-  outcome.confidence = confidence_of(outcome.evidence, second);
-  outcome.verdict = verdict_of(decision, outcome.evidence, second);
+  Evidence evidence{.best = evidence_at(best.distance, best.manifold), .required = decision.required};
+  if (closest_count > 1) evidence.second = evidence_at(closest[1].distance, closest[1].manifold);
+  outcome.decide(evidence, decision.tuning);
   if (outcome.verdict == Verdict::unknown) return;
   estimate_pose(outcome, best);
   const ModelObject& object = model->objects[best.manifold];

@@ -222,7 +222,7 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
 }
 
 TouchingObject TouchingObjects::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
-  TouchingObject object{box, {}, {}};
+  TouchingObject object{box, {}, {}, decision_.required};
   const auto seen = look(box, object.picture);
   if (!seen) return object;
   object.found = seen->vote(shortlist).identify_occluded();
@@ -266,7 +266,7 @@ std::vector<TouchingObject> TouchingObjects::candidates(std::span<const Trial> t
       object = std::move(again);
   }
   std::erase_if(found, [&](const TouchingObject& object) {
-    return !(object.found.evidence > decision_.required - search_slack);
+    return object.found.evidence < decision_.required - search_slack;
   });
   std::ranges::sort(found, by_evidence);
   keep_different(found);
@@ -354,18 +354,20 @@ void TouchingObjects::match_again(const cv::Mat& cut) {
 
 void TouchingObjects::accept(double explained) {
   std::vector<TouchingObject>& objects = result_.objects;
-  const auto sure = [&](const TouchingObject& object, double slack) {
-    return object.found.best.occluded <= most_overlapped &&
-           object.found.evidence > decision_.required - slack;
+  const auto require = [&](auto slack_of) {
+    for (TouchingObject& object : objects) object.required = decision_.required - slack_of(object);
   };
-  const bool all = objects.size() > 1 && explained > least_explained &&
-                   std::ranges::all_of(objects, [&](const TouchingObject& object) {
-                     return sure(object, object.found.best.occluded <= most_left_over ? final_slack : 0.0);
-                   });
-  if (all) return;
+  const auto sure = [](const TouchingObject& object) {
+    return object.found.best.occluded <= most_overlapped && object.found.evidence >= object.required;
+  };
+  require([](const TouchingObject& object) {
+    return object.found.best.occluded <= most_left_over ? final_slack : 0.0;
+  });
+  if (objects.size() > 1 && explained > least_explained && std::ranges::all_of(objects, sure)) return;
   // An object beyond doubt is reported even beside something unknown.
+  require([](const TouchingObject&) { return -beyond_doubt; });
   std::erase_if(objects, [&](const TouchingObject& object) {
-    if (sure(object, -beyond_doubt)) return false;
+    if (sure(object)) return false;
     result_.unknown.push_back(object.box);
     return true;
   });

@@ -27,6 +27,8 @@ struct TouchingObject {
   cv::Rect box;                ///< in the cut-out, pixels; may reach beyond it
   std::vector<float> picture;  ///< as the normaliser makes it of that box
   PartsIdentification found;
+  double required =
+      0.0;  ///< the evidence that was asked of it: more or less than of a region that stands alone
 };
 
 /// A region split into its objects.

@@ -53,13 +53,23 @@ TEST(Decision, ConfidenceIsThePosteriorOfTheBestBesideTheSecondAndAnUnknownObjec
 }
 
 TEST(Decision, TheVerdictFollowsTheRequiredEvidenceAndTheLeadOverTheSecond) {
-  DecisionModel decision;
-  decision.required = 1.0;
-  EXPECT_EQ(verdict_of(decision, 0.99, none), Verdict::unknown);
-  EXPECT_EQ(verdict_of(decision, 1.0, none), Verdict::recognized);
-  EXPECT_EQ(verdict_of(decision, 5.0, 4.2), Verdict::ambiguous);
-  EXPECT_EQ(verdict_of(decision, 5.0, 4.1), Verdict::recognized);
-  EXPECT_EQ(verdict_of(decision, 1.2, 0.9), Verdict::recognized) << "the second would not be accepted itself";
+  const auto verdict = [](double best, double second) { return verdict_of({best, second, 1.0}, {}); };
+  EXPECT_EQ(verdict(0.99, none), Verdict::unknown);
+  EXPECT_EQ(verdict(1.0, none), Verdict::recognized);
+  EXPECT_EQ(verdict(5.0, 4.2), Verdict::ambiguous);
+  EXPECT_EQ(verdict(5.0, 4.1), Verdict::recognized);
+  EXPECT_EQ(verdict(1.2, 0.9), Verdict::recognized) << "the second would not be accepted itself";
+}
+
+TEST(Decision, AnOutcomeCarriesWhatDecidedIt) {
+  Outcome outcome;
+  outcome.decide({3.0, 1.0, -2.0}, {});
+  EXPECT_EQ(outcome.verdict, Verdict::recognized);
+  EXPECT_EQ(outcome.evidence, 3.0);
+  EXPECT_EQ(outcome.required_evidence, -2.0);
+  EXPECT_EQ(outcome.confidence, confidence_of(3.0, 1.0));
+  outcome.decide({-3.0, none, -2.0}, {});
+  EXPECT_EQ(outcome.verdict, Verdict::unknown);
 }
 
 TEST(Decision, ADistanceHasTheEvidenceItWasAskedFor) {

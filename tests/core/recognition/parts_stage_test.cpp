@@ -37,18 +37,20 @@ TEST(PartsStage, MeasuresEachObjectByItsOwnYardstick) {
   const std::size_t one = parts_world().index_of("one");
   auto changed = std::make_shared<Model>(*parts_world().model);
   changed->objects[one].typical_distance = 1e-9;
-  changed->decision.weights.windows[2] = 10.0;
-  changed->decision.weights.whole[2] = 10.0;
-  for (ModelObject& object : changed->objects)
-    if (object.name != "one") object.typical_distance = 1.0;
-  Recognizer recognize(changed);
-  for (double angle = 5.0; angle < 360.0; angle += 60.0) {
-    const auto refused = recognize.recognize(scene_of(1, angle));
-    ASSERT_EQ(refused.size(), 1U);
-    EXPECT_FALSE(refused[0].verdict == Verdict::recognized && refused[0].best->object == "one") << angle;
-    const auto others = recognize.recognize(scene_of(2, angle));
-    ASSERT_EQ(others.size(), 1U);
-    EXPECT_EQ(others[0].verdict, Verdict::recognized) << angle;
+  for (const double weight : {10.0, 20.0}) {
+    changed->decision.weights.windows[2] = changed->decision.weights.whole[2] = weight;
+    changed->decision.weights.windows[0] = changed->decision.weights.whole[0] = 4.5 * weight;
+    changed->decision.tuning.most_occluded = -1.0;  // nothing is occluded
+    Recognizer recognize(changed);
+    for (double angle = 5.0; angle < 360.0; angle += 60.0) {
+      const auto refused = recognize.recognize(scene_of(1, angle));
+      ASSERT_EQ(refused.size(), 1U);
+      EXPECT_EQ(refused[0].verdict, Verdict::unknown) << angle;
+      EXPECT_LT(refused[0].evidence, refused[0].required_evidence);
+      const auto others = recognize.recognize(scene_of(2, angle));
+      ASSERT_EQ(others.size(), 1U);
+      EXPECT_EQ(others[0].verdict, Verdict::recognized) << angle;
+    }
   }
 }
 

@@ -77,12 +77,14 @@ TEST(TouchingObjects, AreSplit) {
   EXPECT_GE(right, pairs - 2) << "of " << pairs;
 }
 
-TEST(PartsStage, HasLessEvidenceTheMoreIsOccluded) {
+TEST(PartsStage, IsLessConfidentAndHasLessEvidenceTheMoreIsOccluded) {
   Recognizer recognize(world().model);
   double last = std::numeric_limits<double>::infinity();
+  double last_confidence = 1.0;
   double least = 1.0;
   for (const double hidden : {0.0, 0.15, 0.3}) {
     double sum = 0.0;
+    double confidence = 0.0;
     int told = 0;
     for (double angle = 5.0; angle < 360.0; angle += 30.0) {
       cv::Mat scene = testing::scene_with(1, angle, PartsWorld::knobs());
@@ -95,6 +97,7 @@ TEST(PartsStage, HasLessEvidenceTheMoreIsOccluded) {
       for (const Outcome& outcome : recognize.recognize(scene)) {
         if (!outcome.best) continue;
         sum += outcome.evidence;  // of what is called unknown, too
+        confidence += outcome.confidence;
         ++told;
         if (outcome.verdict != Verdict::recognized) continue;
         EXPECT_EQ(outcome.best->object, "one");
@@ -104,8 +107,11 @@ TEST(PartsStage, HasLessEvidenceTheMoreIsOccluded) {
     ASSERT_GT(told, 0) << hidden;
     EXPECT_LT(sum / told, last + 1e-9) << hidden;
     last = sum / told;
+    EXPECT_LT(confidence / told, last_confidence + 1e-9) << hidden;
+    last_confidence = confidence / told;
   }
   EXPECT_GT(least, 0.0);
+  EXPECT_LT(last_confidence, 0.9);
 }
 
 TEST(TouchingObjects, AreSplitWithoutTheSizesOfObjectsThatCameReadyCut) {
