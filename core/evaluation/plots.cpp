@@ -172,7 +172,7 @@ struct Interval {
   double upper = 1.0;
 };
 
-/// Of a rate of which `hits` of `n` ≥ 1 were seen: 95 % (Wilson).
+/// 95 % confidence interval of a proportion, from `hits` in `n` ≥ 1 trials (Wilson score).
 Interval wilson(std::size_t hits, std::size_t n) {
   constexpr double z = 1.96;
   const auto count = static_cast<double>(n);
@@ -351,7 +351,7 @@ void draw_legend(SvgDrawing& drawing, double left, double y) {
 
 std::string confusion_svg(const ConfusionMatrix& matrix, std::span<const std::string> names) {
   const MatrixLayout layout = matrix_layout(names);
-  const std::string title = "What was said of which object";
+  const std::string title = "Confusion matrix";
   const double width = std::max(470.0, layout.left + layout.width() + 30.0);
   SvgDrawing drawing(width, layout.top + layout.height() + 84.0, title);
   std::size_t all = 0;

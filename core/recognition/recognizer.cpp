@@ -11,6 +11,7 @@
 #include "core/image/segmentation.h"
 #include "core/recognition/decision.h"
 #include "core/recognition/manifold_samples.h"
+#include "core/recognition/model_searches.h"
 #include "core/recognition/object_eigenspace_index.h"
 #include "core/recognition/parts_stage.h"
 #include "core/search/pattern_rejector.h"
@@ -42,12 +43,6 @@ class Lap {
   TimePoint began_;
 };
 
-std::vector<Manifold> manifolds_of(const Model& model) {
-  std::vector<Manifold> manifolds;
-  for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
-  return manifolds;
-}
-
 /// Whether two poses are within one and a half steps of the learned grid. The universal eigenspace chooses
 /// the basin, because it has seen all objects; the object's own eigenspace refines the pose within it.
 bool same_basin(const Manifold& manifold, const ClosestPoint& a, const ClosestPoint& b) {
@@ -69,9 +64,7 @@ struct Recognizer::Impl {
   Segmenter segmenter;
   Normalizer normalizer;
   AppearanceMaker maker;
-  std::vector<Manifold> manifolds;
-  std::unique_ptr<ManifoldSearch> search;
-  SeparateSearches separate;
+  ModelSearches searches;
   std::unique_ptr<ManifoldSearch> rejector;  ///< asked first, where there is one
   ObjectEigenspaceIndex object_eigenspace_index;
   std::vector<ManifoldSamples> poses;  ///< one an object
@@ -128,9 +121,7 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
       segmenter(model->normalization.segmentation),
       normalizer(model->normalization),
       maker(model->normalization),
-      manifolds(manifolds_of(*model)),
-      search(make_search(options.search, manifolds)),
-      separate(model->parts ? std::span<const Manifold>(manifolds) : std::span<const Manifold>()),
+      searches(*model, options.search),
       object_eigenspace_index(*model),
       mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
       appearances(model->eigenspace.length(), most_projected),
@@ -138,15 +129,16 @@ Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOpt
       typed_from(maker.is_picture() ? 0 : static_cast<Eigen::Index>(picture_length(model->normalization)),
                  most_projected),
       point(model->eigenspace.components()) {
-  poses.reserve(manifolds.size());
-  for (const Manifold& manifold : manifolds) poses.emplace_back(manifold);
+  poses.reserve(searches.manifolds.size());
+  for (const Manifold& manifold : searches.manifolds) poses.emplace_back(manifold);
   for (const ModelObject& object : model->objects)
     search_bound = std::max(
         search_bound,
         search_reach * model->decision.distance_of(model->decision.required, object.typical_distance));
   if (options.rejector && search_bound > 0.0 && std::isfinite(search_bound))
-    rejector = std::make_unique<RejectionSearch>(manifolds, RejectorOptions{.distance = search_bound});
-  if (model->parts) parts.emplace(*model, *search, separate, pool);
+    rejector =
+        std::make_unique<RejectionSearch>(searches.manifolds, RejectorOptions{.distance = search_bound});
+  if (model->parts) parts.emplace(*model, *searches.all, searches.separate, pool);
 }
 
 std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
@@ -172,9 +164,9 @@ void Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
 }
 
 void Recognizer::Impl::find_closest() {
-  closest_count = (rejector ? *rejector : *search).nearest_into(point, closest, search_bound);
+  closest_count = (rejector ? *rejector : *searches.all).nearest_into(point, closest, search_bound);
   // Nothing within reach: the nearest is reported all the same.
-  if (closest_count == 0) closest_count = search->nearest_into(point, std::span(closest).first(1));
+  if (closest_count == 0) closest_count = searches.all->nearest_into(point, std::span(closest).first(1));
 }
 
 void Recognizer::Impl::look_again() {

@@ -1,22 +1,12 @@
 #include "core/learning/calibration/shown_view.h"
 
+#include <algorithm>
 #include <array>
+#include <limits>
 
 #include "core/simd/projection.h"
 
 namespace eigenpose {
-namespace {
-
-std::vector<Manifold> manifolds_of(const Model& model) {
-  std::vector<Manifold> manifolds;
-  for (const ModelObject& object : model.objects) manifolds.push_back(object.manifold);
-  return manifolds;
-}
-
-}  // namespace
-
-ModelSearches::ModelSearches(const Model& model)
-    : manifolds(manifolds_of(model)), all(make_search("tree", manifolds)), separate(manifolds) {}
 
 ShownView::ShownView(const Model& model, const ModelSearches& searches)
     : model_(model),

@@ -2,8 +2,6 @@
 
 /// A learned view, perturbed and compared as a region of a frame would be.
 
-#include <limits>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,18 +13,9 @@
 #include "core/learning/training_views.h"
 #include "core/model/model.h"
 #include "core/recognition/aligned_match.h"
-#include "core/search/search.h"
+#include "core/recognition/model_searches.h"
 
 namespace eigenpose {
-
-/// The searches over a model's manifolds, made once for all threads.
-struct ModelSearches {
-  explicit ModelSearches(const Model& model);
-
-  std::vector<Manifold> manifolds;
-  std::unique_ptr<ManifoldSearch> all;
-  SeparateSearches separate;
-};
 
 /// Shows one picture after the other. Holds scratch memory: one thread at a time.
 class ShownView {
