@@ -2,38 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/alignment/masked_alignment.h"
 #include "core/alignment/misalignment.h"
 #include "core/base/insertion_sort.h"
+#include "core/recognition/parts_recognizer_impl.h"
 
 namespace eigenpose {
 namespace {
 
-constexpr double window_count = QueryWindows::count;  // each window counts as one observation
 constexpr double close_merit = 40.0;  // poses this close in merit are voted on again after alignment
 constexpr std::size_t most_revoted = 3;
-constexpr std::size_t most_occluded_starts = 6;  // peaks of the votes that are approached
-/// Starts that are refined: at most this many, and those within this merit of the best of all objects.
-constexpr std::size_t most_occluded_poses = 3;
-constexpr double hopeless_merit = 20.0;
-/// Weights of the merit of an occluded pose: see the header.
-constexpr double vote_merit = 2.0 * window_count;
-constexpr double visible_merit = 0.15 * window_count;
-constexpr double unexplained_merit = 0.1;
-/// Objects compared pixel by pixel in an occluded region: at most this many, with at least this share of the
-/// most votes.
-constexpr std::size_t most_rivals = 4;
-constexpr double rival_votes = 0.8;
-constexpr float familiar_likeness = 0.6F;                 // a window with this κ is fully trusted
-constexpr double most_unexplained = 0.5 * 9.0 * 32 * 32;  // every pixel 3 σ off
-constexpr double masked_reach = 12.0 / 360.0;
 
 /// Votes of the learned views next to a pose: the best of those within one step in every DOF; where the views
 /// leave a gap there, of the nearest view.
@@ -64,90 +46,6 @@ double votes_near(const std::vector<float>& votes, const PartsObject& object,
 
 }  // namespace
 
-/// A pose of an occluded object that is being followed.
-struct OccludedStart {
-  MaskedPose pose;
-  double votes = 0.0;
-  double merit = 0.0;
-};
-
-/// An object that may be partly visible in an occluded region.
-struct OccludedAnswer {
-  PartsAnswer answer;
-  std::vector<float> trust;           ///< of the pixels, by the object's best view
-  std::vector<OccludedStart> starts;  ///< best first, not empty
-};
-
-struct PartsRecognizer::Impl {
-  Impl(const PartsModel& learned, const DecisionModel& rule)
-      : model(learned),
-        decision(rule),
-        mapper(learned.background),
-        matcher(learned.objects, learned.scale, learned.voting),
-        rematcher(learned.objects, learned.scale, learned.voting),
-        aligner([&] {
-          options.noise = learned.noise;
-          return options;
-        }()),
-        masked_aligner(options) {
-    everything.resize(learned.objects.size());
-    std::iota(everything.begin(), everything.end(), std::size_t{0});
-  }
-
-  const PartsModel& model;
-  const DecisionModel& decision;
-  AlignmentOptions options;
-  OrientationGridMaker mapper;
-  PartialMatcher matcher;    ///< of the picture as it is
-  PartialMatcher rematcher;  ///< of the picture aligned with one pose
-  PoseAligner aligner;
-  MaskedAligner masked_aligner;
-  std::vector<std::size_t> everything;
-  cv::Mat picture;
-  cv::Mat pixels;  ///< the picture as floats, once they were asked for
-  bool pixels_made = false;
-  cv::Mat aligned_pixels;
-  cv::Mat aligned;
-  OrientationGrid map;
-  QueryWindows windows;  ///< of the picture, once they were asked for
-  bool windows_made = false;
-  QueryWindows aligned_windows;
-  PosePicture pose_picture;  ///< likewise
-  bool pose_picture_made = false;
-  std::uint64_t pictures = 0;  ///< looked at so far
-  std::uint64_t votes = 0;     ///< taken so far
-  std::span<const PartialVote> ranked;
-  std::vector<float> plain_votes;    ///< of one object's views, in the picture
-  std::vector<float> aligned_votes;  ///< the same in the aligned one
-  std::vector<float> likeness;
-  std::vector<float> background;
-  double mean_foreign = 0.0;  ///< mean κ of the windows that foreign_share counted last
-
-  const PosePicture& posed();
-  void vote(std::span<const std::size_t> shortlist);
-  void vote_without(std::size_t object, std::span<const int> views);
-  WindowsMatch match_of(std::size_t object, const std::vector<float>& plain) const;
-  PartsIdentification identify_occluded();
-  /// ln of the cost of the best pose over all pixels, over that of the best pose over the visible ones.
-  double gain_of_masking(const PartsAnswer& answer);
-  const std::vector<float>& votes_of(std::size_t object);
-  double share_after_alignment(std::size_t object, const PartsPose& pose);
-  double foreign_share(std::size_t object, int candidate);
-  /// The same of the view with most votes.
-  double occluded_share(std::size_t object, const std::vector<float>& plain);
-  PartsAnswer find_poses(std::size_t object, const std::vector<float>& plain, double occluded);
-  OccludedAnswer approach_occluded(std::size_t object, const std::vector<float>& plain, double occluded);
-  /// Follows the starts of this merit and more to the end.
-  void refine_occluded(OccludedAnswer& found, double hopeless);
-  /// Objects that may be occluded here, best first, each with a pose. The second is there if any other was
-  /// voted for.
-  std::vector<OccludedAnswer> find_rivals();
-  /// The pose of a candidate, moved by the parabola through its neighbours' votes.
-  [[nodiscard]] PoseVector voted_pose(std::size_t object, const std::vector<float>& plain,
-                                      int candidate) const;
-  [[nodiscard]] std::vector<float> pixel_trust() const;
-};
-
 const PosePicture& PartsRecognizer::Impl::posed() {
   if (!pose_picture_made) make_pose_picture(picture, pose_picture);
   pose_picture_made = true;
@@ -176,7 +74,7 @@ double PartsRecognizer::Impl::share_after_alignment(std::size_t object, const Pa
          aligned_windows.total_weight;
 }
 
-double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
+ForeignWindows PartsRecognizer::Impl::foreign_windows(std::size_t object, int candidate) {
   matcher.window_likeness(object, candidate, likeness, background);
   double count = 0.0;
   double sum = 0.0;
@@ -185,8 +83,7 @@ double PartsRecognizer::Impl::foreign_share(std::size_t object, int candidate) {
     count += 1.0;
     sum += static_cast<double>(kappa);
   }
-  mean_foreign = count > 0.0 ? sum / count : 0.0;
-  return count / static_cast<double>(likeness.size());
+  return {count / static_cast<double>(likeness.size()), count > 0.0 ? sum / count : 0.0};
 }
 
 double PartsRecognizer::Impl::occluded_share(std::size_t object, const std::vector<float>& plain) {
@@ -197,38 +94,7 @@ double PartsRecognizer::Impl::occluded_share(std::size_t object, const std::vect
       best = static_cast<int>(c);
     }
   }
-  return foreign_share(object, best);
-}
-
-std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
-  // The trust of a cell is the mean over the windows that contain it; a pixel has its cell's, squared.
-  constexpr int cells = OrientationGrid::cells;
-  std::array<float, cells * cells> sum{};
-  std::array<float, cells * cells> count{};
-  for (std::size_t w = 0; w < likeness.size(); ++w) {
-    const float trust =
-        std::clamp((likeness[w] - foreign_likeness) / (familiar_likeness - foreign_likeness), 0.0F, 1.0F);
-    const int row =
-        static_cast<int>(w) / QueryWindows::per_side * QueryWindows::stride - OrientationGrid::pad;
-    const int column =
-        static_cast<int>(w) % QueryWindows::per_side * QueryWindows::stride - OrientationGrid::pad;
-    for (int r = std::max(row, 0); r < std::min(row + WindowGrid::window, cells); ++r) {
-      for (int c = std::max(column, 0); c < std::min(column + WindowGrid::window, cells); ++c) {
-        sum[static_cast<std::size_t>(r * cells + c)] += trust;
-        count[static_cast<std::size_t>(r * cells + c)] += 1.0F;
-      }
-    }
-  }
-  constexpr int side = 32;
-  std::vector<float> weights(static_cast<std::size_t>(side) * side);
-  for (int r = 0; r < side; ++r) {
-    for (int c = 0; c < side; ++c) {
-      const auto cell = static_cast<std::size_t>(r * cells / side * cells + c * cells / side);
-      const float mean = sum[cell] / std::max(count[cell], 1.0F);
-      weights[static_cast<std::size_t>(r * side + c)] = mean * mean;
-    }
-  }
-  return weights;
+  return foreign_windows(object, best).share;
 }
 
 PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vector<float>& plain,
@@ -239,7 +105,7 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
   const PartsObject& parts = model.objects[object];
   const AlignmentEigenspace& space = model.poses[object];
   const auto merit = [&](const PartsPose& pose) {
-    return window_count * pose.votes - 0.5 * pose.cost / model.noise;
+    return QueryWindows::count * pose.votes - 0.5 * pose.cost / model.noise;
   };
   for (const AlignedPose& found : aligner.align(posed(), space)) {
     PartsPose pose{
@@ -262,82 +128,6 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
   }
   insertion_sort(answer.poses, better);
   return answer;
-}
-
-PoseVector PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
-                                             int candidate) const {
-  const PartsObject& parts = model.objects[object];
-  const auto axes = model.poses[object].coarse_manifold().axes();
-  PoseVector q;
-  q.resize(axes.size());
-  const int view = parts.candidates[static_cast<std::size_t>(candidate)].view;
-  for (std::size_t a = 0; a < axes.size(); ++a)
-    q[a] = model.view_poses[object](static_cast<Eigen::Index>(a), view);
-  const auto& near = parts.neighbours[static_cast<std::size_t>(candidate)];
-  if (axes.size() == 1 && near[0] >= 0 && near[1] >= 0) {
-    const double after = plain[static_cast<std::size_t>(near[0])];
-    const double before = plain[static_cast<std::size_t>(near[1])];
-    const double curvature = after - 2.0 * plain[static_cast<std::size_t>(candidate)] + before;
-    if (curvature < 0.0) {
-      const double step = axes[0].dof.period() / static_cast<double>(axes[0].samples.size());
-      q[0] = axes[0].dof.canonical(q[0] + step * std::clamp(0.5 * (before - after) / curvature, -1.0, 1.0));
-    }
-  }
-  return q;
-}
-
-OccludedAnswer PartsRecognizer::Impl::approach_occluded(std::size_t object, const std::vector<float>& plain,
-                                                        double occluded) {
-  const PartsObject& parts = model.objects[object];
-  OccludedAnswer found;
-  found.answer.object = object;
-  found.answer.occluded = occluded;
-  // Views with more votes than their neighbours, most votes first.
-  std::vector<int> peaks;
-  for (std::size_t c = 0; c < plain.size(); ++c) {
-    const auto& near = parts.neighbours[c];
-    if (!parts.candidates[c].mirrored &&
-        (near[0] < 0 || plain[c] >= plain[static_cast<std::size_t>(near[0])]) &&
-        (near[1] < 0 || plain[c] >= plain[static_cast<std::size_t>(near[1])])) {
-      peaks.push_back(static_cast<int>(c));
-    }
-  }
-  std::sort(peaks.begin(), peaks.end(), [&](int a, int b) {
-    return plain[static_cast<std::size_t>(a)] > plain[static_cast<std::size_t>(b)];
-  });
-  peaks.resize(std::min(peaks.size(), most_occluded_starts));
-  // All poses are compared on the pixels that the best view trusts.
-  foreign_share(object, peaks.front());
-  found.trust = pixel_trust();
-  masked_aligner.look(posed(), model.poses[object], found.trust);
-  found.answer.foreign_likeness = mean_foreign;
-  found.starts.reserve(peaks.size());
-  for (const int peak : peaks) {
-    OccludedStart start{masked_aligner.approach(voted_pose(object, plain, peak), masked_reach),
-                        plain[static_cast<std::size_t>(peak)] / windows.total_weight, 0.0};
-    start.merit =
-        vote_merit * start.votes - visible_merit * std::log(std::max(start.pose.aligned.cost, model.noise));
-    found.starts.push_back(start);
-  }
-  std::ranges::stable_sort(found.starts, std::greater<>(), &OccludedStart::merit);
-  return found;
-}
-
-void PartsRecognizer::Impl::refine_occluded(OccludedAnswer& found, double hopeless) {
-  PartsAnswer& answer = found.answer;
-  masked_aligner.look(posed(), model.poses[answer.object], found.trust);
-  for (OccludedStart& start : found.starts) {
-    const bool followed = start.merit >= hopeless && answer.poses.size() < most_occluded_poses;
-    if (!followed) break;
-    masked_aligner.refine(start.pose, masked_reach);
-    const AlignedPose& pose = start.pose.aligned;
-    const double merit = vote_merit * start.votes -
-                         visible_merit * std::log(std::max(pose.cost, model.noise)) -
-                         unexplained_merit * start.pose.unexplained;
-    answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes, merit,
-                            start.pose.unexplained / most_unexplained});
-  }
-  insertion_sort(answer.poses, [](const PartsPose& a, const PartsPose& b) { return a.merit > b.merit; });
 }
 
 PartsRecognizer::PartsRecognizer(const PartsModel& model, const DecisionModel& decision)
@@ -400,9 +190,7 @@ PartsAnswer PartsRecognizer::Votes::settle(std::size_t object) const {
   const std::vector<float>& plain = impl().votes_of(object);
   const double share = impl_->occluded_share(object, plain);
   if (share <= impl_->model.calibration[object].foreign_share) return impl_->find_poses(object, plain, share);
-  OccludedAnswer found = impl_->approach_occluded(object, plain, share);
-  impl_->refine_occluded(found, found.starts.front().merit - hopeless_merit);
-  return found.answer;
+  return impl_->find_occluded_poses(object, plain, share);
 }
 
 PartsIdentification PartsRecognizer::Votes::identify_occluded() const {
@@ -448,61 +236,6 @@ WindowsMatch PartsRecognizer::Impl::match_of(std::size_t object, const std::vect
       std::ranges::find_if(ranked, [object](const PartialVote& vote) { return vote.object != object; });
   if (next != ranked.end()) match.next = share(next->score);
   return match;
-}
-
-std::vector<OccludedAnswer> PartsRecognizer::Impl::find_rivals() {
-  std::vector<OccludedAnswer> rivals;
-  const auto approach = [&](const PartialVote& vote) {
-    const std::vector<float>& plain = votes_of(vote.object);
-    rivals.push_back(approach_occluded(vote.object, plain, occluded_share(vote.object, plain)));
-  };
-  for (std::size_t i = 0; i < std::min(most_rivals, ranked.size()); ++i) {
-    if (ranked[i].score < rival_votes * ranked[0].score) break;
-    approach(ranked[i]);
-  }
-  double most = -std::numeric_limits<double>::infinity();
-  for (const OccludedAnswer& rival : rivals) most = std::max(most, rival.starts.front().merit);
-  double best = -std::numeric_limits<double>::infinity();
-  for (OccludedAnswer& rival : rivals) {
-    refine_occluded(rival, most - hopeless_merit);
-    if (!rival.answer.poses.empty()) best = std::max(best, rival.answer.poses.front().merit);
-  }
-  // The second object is reported in any case, by its approached pose if it was not refined.
-  const std::size_t contenders = rivals.size();
-  if (rivals.size() == 1 && ranked.size() > 1 && ranked[1].score > 0.0F) approach(ranked[1]);
-  for (OccludedAnswer& rival : rivals) {
-    if (!rival.answer.poses.empty()) continue;
-    const OccludedStart& start = rival.starts.front();
-    const AlignedPose& pose = start.pose.aligned;
-    rival.answer.poses.push_back({pose.q, pose.q_covariance, pose.misalignment, pose.cost, start.votes,
-                                  best - std::max(most - start.merit, hopeless_merit)});
-  }
-  const auto refined = std::span(rivals).first(contenders);
-  std::ranges::stable_sort(refined, std::greater<>(),
-                           [](const OccludedAnswer& rival) { return rival.answer.poses.front().merit; });
-  return rivals;
-}
-
-double PartsRecognizer::Impl::gain_of_masking(const PartsAnswer& answer) {
-  const auto above_noise = [this](double cost) { return std::log(std::max(cost, model.noise)); };
-  return above_noise(aligner.align(posed(), model.poses[answer.object]).front().cost) -
-         above_noise(answer.poses.front().cost);
-}
-
-PartsIdentification PartsRecognizer::Impl::identify_occluded() {
-  const std::vector<OccludedAnswer> rivals = find_rivals();
-  PartsIdentification found;
-  found.best = rivals[0].answer;
-  const double merit = found.best.poses.front().merit;
-  found.match = {match_of(found.best.object, votes_of(found.best.object)), found.best.occluded, merit,
-                 found.best.poses.front().unexplained, found.best.foreign_likeness};
-  found.evidence = evidence_of(decision.weights, found.match);
-  found.second_evidence = -std::numeric_limits<double>::infinity();
-  if (rivals.size() > 1) {
-    found.second = rivals[1].answer;
-    found.second_evidence = found.evidence - (merit - found.second->poses.front().merit);
-  }
-  return found;
 }
 
 }  // namespace eigenpose
