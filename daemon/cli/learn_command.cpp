@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "core/base/atomic_file.h"
@@ -68,14 +69,23 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// A rate in percent. Where none of `n` views showed it, only its bound 1/(n + 1) is known.
+std::string rate_text(double rate, std::size_t n) {
+  return rate > 0.0 ? fmt::format("{:.2f} %", 100.0 * rate)
+                    : fmt::format("under {:.2f} %", 100.0 / (static_cast<double>(n) + 1.0));
+}
+
 /// What the views can support of the rates that were set.
 void print_rates(const DecisionModel& decision) {
-  const auto percent = [](double share) { return 100.0 * share; };
-  std::printf(
-      "expected: %.2f %% of known views rejected (set %.2f %%), %.2f %% of unknown objects accepted (set "
-      "%.2f %%)\n",
-      percent(decision.expected.false_rejection), percent(decision.set.false_rejection),
-      percent(decision.expected.false_acceptance), percent(decision.set.false_acceptance));
+  std::printf("expected: %s of known views rejected (set %.2f %%)",
+              rate_text(decision.expected.false_rejection, decision.known.size()).c_str(),
+              100.0 * decision.set.false_rejection);
+  if (decision.unknown.empty())
+    std::printf("; the objects learned tell nothing of unknown ones\n");
+  else
+    std::printf(", %s of unknown objects accepted (set %.2f %%)\n",
+                rate_text(decision.expected.false_acceptance, decision.unknown.size()).c_str(),
+                100.0 * decision.set.false_acceptance);
   if (decision.gives_up_false_rejection())
     std::printf(
         "note: the views do not hold both rates; that of false acceptances is held. More views of each "
