@@ -58,6 +58,38 @@ TEST(OrientationGrid, IsZeroInItsFrame) {
   EXPECT_NEAR(map.brightness_at(10, 10)[0], std::sqrt(200.0F / 255.0F), 1e-4F);
 }
 
+TEST(OrientationGrid, TakesTheBackgroundOffDownToNothing) {
+  // Root brightness 0.2 on the left and 0.8 on the right; a background of 0.5, as when it is made or after.
+  cv::Mat picture(64, 64, CV_8UC1, cv::Scalar(255 * 0.2 * 0.2));
+  picture.colRange(32, 64).setTo(255 * 0.8 * 0.8);
+  const std::array<float, 3> background{0.5F, 0.0F, 0.0F};
+  OrientationGrid made;
+  OrientationGridMaker(background).compute(picture, made);
+  OrientationGrid later = map_of(picture);
+  take_off(background, later);
+  EXPECT_EQ(made.brightness, later.brightness);
+  for (const int row : {OrientationGrid::pad, 10, OrientationGrid::pad + OrientationGrid::cells - 1}) {
+    EXPECT_EQ(made.brightness_at(row, 5)[0], 0.0F);
+    EXPECT_GT(made.brightness_at(row, 14)[0], 0.1F);
+  }
+  EXPECT_NEAR(made.brightness_at(10, 14)[0], 0.3F, 0.005F);
+  EXPECT_EQ(made.brightness_at(1, 14)[0], 0.0F) << "nothing is taken off the frame";
+}
+
+TEST(OrientationGrid, HasTheMedianOfTheCornersAsBackgroundLevel) {
+  std::vector<OrientationGrid> maps;
+  for (const double level : {10.0, 90.0, 250.0}) {
+    cv::Mat picture(64, 64, CV_8UC3, cv::Scalar(level, 40.0, level));
+    picture(cv::Rect(8, 8, 48, 48)).setTo(cv::Scalar::all(255));
+    maps.push_back(map_of(picture));
+  }
+  const auto found = background_level(maps);
+  // The corner cells are blurred over their neighbours, of which all show background too.
+  EXPECT_NEAR(found[0], maps[1].brightness_at(2, 2)[0], 1e-6F);
+  EXPECT_NEAR(found[1], maps[0].brightness_at(2, 2)[1], 1e-6F);
+  EXPECT_EQ(background_level({}), (std::array<float, 3>{}));
+}
+
 TEST(OrientationGrid, RefusesAPictureThatIsNotSquare) {
   OrientationGridMaker mapper;
   OrientationGrid map;

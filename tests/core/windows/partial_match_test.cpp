@@ -138,6 +138,58 @@ TEST(PartialMatcher, SharesVotesWithTheNeighboursOfAView) {
   }
 }
 
+TEST(PartialMatcher, GivesAViewTheShareOfItsNeighboursThatTheOptionSays) {
+  // A region that shows one of two neighbouring views in its first rows, the other in the rest.
+  const World world(1);
+  const QueryWindows other = query_of(world.views[0][1]);
+  QueryWindows query = query_of(world.views[0][0]);
+  constexpr std::size_t first = 5UL * QueryWindows::per_side;
+  std::copy(other.windows.begin() + first, other.windows.end(), query.windows.begin() + first);
+  const auto rest = static_cast<float>(query.windows.size() - first);
+  for (const float pooling : {0.0F, 0.5F, 1.0F}) {
+    VotingOptions options;
+    options.pooling = pooling;
+    PartialMatcher matcher(world.objects, scale, options);
+    const float expected = static_cast<float>(first) + pooling * rest;
+    EXPECT_NEAR(matcher.match(query, world.shortlist)[0].score, expected, 0.02F * query.total_weight);
+  }
+}
+
+/// What is left of an object when some of its views are not learned. Without neighbours.
+PartsObject object_without(const World& world, std::size_t object, const std::vector<int>& left_out) {
+  std::vector<Eigen::MatrixXf> kept;
+  for (int v = 0; v < 4; ++v)
+    if (std::ranges::find(left_out, v) == left_out.end())
+      kept.push_back(world.views[object][static_cast<std::size_t>(v)]);
+  PartsObject made = object_of(kept);
+  for (auto& near : made.neighbours) near = {-1, -1};
+  return made;
+}
+
+std::vector<std::pair<std::size_t, float>> scores_of(std::span<const PartialVote> votes) {
+  std::vector<std::pair<std::size_t, float>> scores;
+  for (const PartialVote& vote : votes) scores.emplace_back(vote.object, vote.score);
+  return scores;
+}
+
+TEST(PartialMatcher, LeavesCandidatesOutAsIfTheyHadNotBeenLearned) {
+  World world(9);
+  for (std::size_t o = 0; o < 9; ++o) world.objects[o] = object_without(world, o, {});
+  PartialMatcher matcher(world.objects, scale);
+  const QueryWindows query = query_of(world.views[3][1]);
+  const auto all = scores_of(matcher.match(query, world.shortlist));
+  for (const auto& left_out : {std::vector<int>{2}, std::vector<int>{1}, std::vector<int>{0, 1, 3}}) {
+    World fewer = world;
+    fewer.objects[3] = object_without(world, 3, left_out);
+    PartialMatcher expected(fewer.objects, scale);
+    EXPECT_EQ(scores_of(matcher.match_without(3, left_out)),
+              scores_of(expected.match(query, world.shortlist)));
+  }
+  // What was left out before is there again, in the background of the others too.
+  EXPECT_EQ(scores_of(matcher.match_without(5, {})), all);
+  EXPECT_THROW((void)matcher.match_without(9, {}), std::invalid_argument);
+}
+
 TEST(PartialMatcher, RefusesVotesOfAnObjectThatWasNotMatched) {
   const World world(3);
   PartialMatcher matcher(world.objects, scale);
