@@ -1,5 +1,6 @@
 #include "core/model/hdf5_output.h"
 
+#include <array>
 #include <cerrno>
 #include <cstdint>
 
@@ -7,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/input_file.h"
+#include "core/model/hdf5_links.h"
 #include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
@@ -111,6 +113,47 @@ TEST_F(Hdf5Output, IntegersAreReadWithinBounds) {
               ThrowsMessage<Hdf5Failure>(HasSubstr("has \"count\" of 1099511627776; allowed are 0 to 7")));
   EXPECT_THROW((void)root.read_integer("count", (std::int64_t{1} << 40) + 1, std::int64_t{1} << 50),
                Hdf5Failure);
+}
+
+TEST_F(Hdf5Output, RefusesAnAttributeOfSeveralValuesWhereOneIsAskedFor) {
+  AtomicFile file(path_);
+  write_hdf5(file, 0, [](const Hdf5Group& root) {
+    const std::array<double, 64> values{};
+    const hsize_t count = values.size();
+    const Hdf5Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose, "space");
+    for (const char* name : {"number", "count"}) {
+      const Hdf5Handle attribute(
+          H5Acreate2(root.id(), name, H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+          "attribute");
+      ASSERT_GE(H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, values.data()), 0);
+    }
+  });
+  file.commit();
+  const Hdf5Lock lock;
+  const Hdf5Handle open = open_hdf5(path_);
+  const Hdf5Group root = root_of(open);
+  EXPECT_THAT([&] { (void)root.read_double("number"); },
+              ThrowsMessage<Hdf5Failure>(HasSubstr("no attribute \"number\" of the right kind")));
+  EXPECT_THROW((void)root.read_integer("count", 0, 9), Hdf5Failure);
+}
+
+TEST_F(Hdf5Output, KeepsEveryOptionOfNormalization) {
+  NormalizationOptions options;
+  options.size = 40;
+  options.color = false;
+  options.type = "gradient";
+  options.cropped = true;
+  options.segmentation = {17, 2.5, 7, 0.004};
+  AtomicFile file(path_);
+  write_hdf5(file, 0, [&](const Hdf5Group& root) {
+    write_normalization(root.make_group("other"), options);
+    write_normalization(root.make_group("default"), {});
+  });
+  file.commit();
+  const Hdf5Lock lock;
+  const Hdf5Handle open = open_hdf5(path_);
+  EXPECT_EQ(read_normalization(root_of(open).open_group("other")), options);
+  EXPECT_EQ(read_normalization(root_of(open).open_group("default")), NormalizationOptions{});
 }
 
 TEST_F(Hdf5Output, RefusesADatasetThatClaimsMoreThanTheFileHolds) {

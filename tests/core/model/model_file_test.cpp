@@ -128,6 +128,31 @@ TEST_F(ModelFile, RefusesAFileCutOffOrContinuedAnywhere) {
   EXPECT_THAT(refusal(), HasSubstr("damaged"));
 }
 
+TEST_F(ModelFile, IsTruncatedWhereverItsSealIsCut) {
+  const auto bytes = read_file(file());
+  const std::string start(bytes.begin(), bytes.begin() + 64);
+  const std::size_t version_end = start.find("version 4") + 9;
+  for (std::size_t size = version_end; size < seal_size; ++size) {
+    write({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)});
+    EXPECT_THAT(refusal(), HasSubstr("truncated")) << size;
+  }
+}
+
+TEST_F(ModelFile, KeepsWhereItCameFrom) {
+  Model model = *testing::learned_world().model;
+  for (const double bound : {0.0, 0.02}) {
+    model.provenance = {"1.2.3", "2026-01-02T03:04:05Z", "/sets/lab", "krylov", 0.93, bound};
+    save_model(model, file());
+    const Provenance read = load_model(file()).provenance;
+    EXPECT_EQ(read.program_version, "1.2.3");
+    EXPECT_EQ(read.created, "2026-01-02T03:04:05Z");
+    EXPECT_EQ(read.image_sets, "/sets/lab");
+    EXPECT_EQ(read.solver, "krylov");
+    EXPECT_EQ(read.energy, 0.93);
+    EXPECT_EQ(read.energy_bound, bound);
+  }
+}
+
 TEST_F(ModelFile, SaysWhatToDoAboutAnotherVersion) {
   auto bytes = read_file(file());
   const std::string text(bytes.begin(), bytes.begin() + 100);

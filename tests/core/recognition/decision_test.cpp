@@ -72,32 +72,5 @@ TEST(Decision, AnOutcomeCarriesWhatDecidedIt) {
   EXPECT_EQ(outcome.verdict, Verdict::unknown);
 }
 
-TEST(Decision, ADistanceHasTheEvidenceItWasAskedFor) {
-  DecisionModel decision;
-  decision.weights.whole = {-5.0, -7.0, 3.0};
-  for (const double evidence : {-3.0, 0.0, 4.0}) {
-    const double distance = decision.distance_of(evidence, 0.02);
-    EXPECT_NEAR(evidence_of(decision.weights, WholeMatch{distance, 0.02}), evidence, 1e-9);
-  }
-  decision.weights.whole[1] = 0.0;
-  EXPECT_TRUE(std::isinf(decision.distance_of(0.0, 0.02)));
-}
-
-TEST(Decision, BothRatesFollowTheThreshold) {
-  DecisionModel decision;
-  decision.known = {1.0, 2.0, 3.0, 4.0};
-  decision.unknown = {-2.0, -1.0, 0.0, 3.5};
-  EXPECT_EQ(rates_at(decision, 2.5), (DecisionRates{0.5, 0.25}));
-  EXPECT_EQ(rates_at(decision, 3.5), (DecisionRates{0.75, 0.25})) << "as much evidence is enough";
-  EXPECT_EQ(rates_at(decision, -9.0), (DecisionRates{0.0, 1.0}));
-  EXPECT_EQ(rates_at({}, 0.0), (DecisionRates{0.0, 0.0}));
-  EXPECT_DOUBLE_EQ(decision.smallest_rate(), 0.2);
-  decision.set = {0.3, 0.1};
-  decision.expected = {0.25, 0.1};
-  EXPECT_FALSE(decision.gives_up_false_rejection());
-  decision.expected.false_rejection = 0.5;
-  EXPECT_TRUE(decision.gives_up_false_rejection());
-}
-
 }  // namespace
 }  // namespace eigenpose
