@@ -113,6 +113,17 @@ TEST(ManifoldFit, ReproducesLinesOnUnevenAxes) {
   }
 }
 
+TEST(ManifoldFit, IsNotDeterminedBySamplesThatAllStandBeyondOneEnd) {
+  // A pose beyond the end of an axis counts as the end.
+  Eigen::MatrixXd poses(1, 3);
+  poses << 10.0, 12.0, 15.0;
+  EXPECT_EQ(Manifold::undetermined_dof(std::vector{line("x", 4)}, poses), "x");
+  poses << 0.0, -2.0, -5.0;
+  EXPECT_EQ(Manifold::undetermined_dof(std::vector{line("x", 4)}, poses), "x");
+  poses << -5.0, 12.0, 15.0;
+  EXPECT_EQ(Manifold::undetermined_dof(std::vector{line("x", 4)}, poses), "");
+}
+
 TEST(ManifoldFit, FollowsASmoothFunctionThroughScatteredPoses) {
   std::mt19937 random(3);
   const std::vector<SampleAxis> axes{turn(16), line("light", 5)};
