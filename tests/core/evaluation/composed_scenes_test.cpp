@@ -4,8 +4,10 @@
 #include <algorithm>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "core/evaluation/evaluation.h"
+#include "core/image/foreground.h"
 #include "tests/support/learned_world.h"
 
 namespace eigenpose {
@@ -34,6 +36,44 @@ TEST(ComposedScenes, ObjectsStandApartUnlessAskedToTouch) {
     ASSERT_EQ(fused.objects.size(), scattered.objects.size());
     EXPECT_EQ(segmenter.segment(fused.picture).size(), 1U);
   }
+}
+
+/// The filled outline of the object in a view.
+cv::Mat mask_of(const SetView& shown) {
+  Segmenter segmenter;
+  const cv::Mat image = learned_world().sets[shown.set].load(shown.view);
+  const auto regions = segmenter.segment(image);
+  const auto largest = std::ranges::max_element(regions, {}, [](const Region& r) { return r.box.area(); });
+  const cv::Mat cut = segmenter.cut_out(image, static_cast<std::size_t>(largest - regions.begin()));
+  cv::Mat mask = foreground_of(cut, segmenter.background());
+  std::vector<std::vector<cv::Point>> outlines;
+  cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+  cv::drawContours(mask, outlines, -1, cv::Scalar::all(255), cv::FILLED);
+  return mask;
+}
+
+TEST(ComposedScenes, HideNoMoreOfAnObjectThanAskedForHoweverManyStandBeforeIt) {
+  constexpr double overlap = 0.2;
+  const auto views = every_view();
+  SceneComposer composer(learned_world().sets, views, {.overlap = overlap}, {});
+  double most = 0.0;
+  for (std::size_t s = 0; s < 60; ++s) {
+    const ComposedScene scene = composer.compose(s);
+    std::vector<cv::Mat> masks;  // of the frame
+    for (const ComposedScene::Placed& placed : scene.objects) {
+      masks.push_back(cv::Mat::zeros(scene.picture.size(), CV_8U));
+      mask_of(placed.shown).copyTo(masks.back()(placed.box));
+    }
+    for (std::size_t i = 0; i < masks.size(); ++i) {
+      cv::Mat before = cv::Mat::zeros(scene.picture.size(), CV_8U);
+      for (std::size_t k = i + 1; k < masks.size(); ++k) before |= masks[k];
+      const double share =
+          cv::countNonZero(before & masks[i]) / static_cast<double>(cv::countNonZero(masks[i]));
+      EXPECT_LE(share, overlap) << "object " << i << " of scene " << s;
+      most = std::max(most, share);
+    }
+  }
+  EXPECT_GT(most, 0.1) << "or the bound is never near";
 }
 
 TEST(ComposedScenes, TellWhereEachObjectStands) {
@@ -97,6 +137,23 @@ TEST(ComposedScenes, AreCountedByTheirTruth) {
   EXPECT_EQ(report.extra, 2U);
   ASSERT_EQ(report.pose_errors.size(), 2U);
   EXPECT_NEAR(report.pose_errors[0], 4.0, 1e-9);
+}
+
+TEST(ComposedScenes, CountARegionForOneObjectAlone) {
+  // Two objects almost behind each other, of which one region was found.
+  const ImageSet& set = learned_world().sets[0];
+  ComposedScene scene;
+  for (const int x : {10, 14}) scene.objects.push_back({{0, 0}, {x, 10, 50, 50}});
+  Outcome outcome;
+  outcome.box = {12, 10, 50, 50};
+  outcome.verdict = Verdict::recognized;
+  outcome.best = {set.object(), {set.views()[0].q[0]}, 0.1};
+  SceneReport report;
+  count_scene(scene, learned_world().sets, std::span(&outcome, 1), report);
+  EXPECT_EQ(report.objects, 2U);
+  EXPECT_EQ(report.found, 1U);
+  EXPECT_EQ(report.recognized, 1U);
+  EXPECT_EQ(report.extra, 0U);
 }
 
 TEST(ComposedScenes, AreRecognisedWhereObjectsStandApart) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "core/dataset/coil_import.h"
+#include "core/learning/calibration/decision_calibration.h"
 #include "tests/support/learned_world.h"
 
 namespace eigenpose {
@@ -104,6 +105,74 @@ TEST(Evaluation, ShowsTheTestViewsToModelsWithoutTheirObjectToo) {
     EXPECT_FALSE(unknown.pose_error.has_value());
   }
   for (const ObjectEvaluation& object : report.objects) EXPECT_EQ(object.counts.unknown, 12U);
+}
+
+/// The model without object `o`, taken apart by hand.
+std::shared_ptr<const Model> model_without(const Model& whole, std::size_t o,
+                                           const LearningReport& learning) {
+  auto rest = std::make_shared<Model>(whole);
+  rest->decision = calibrate_decision(learning.probes, whole.decision.set, o);
+  rest->objects.clear();
+  PartsModel parts = *whole.parts;
+  parts.objects.clear();
+  parts.poses.clear();
+  parts.calibration.clear();
+  parts.view_poses.clear();
+  parts.extents.clear();
+  for (std::size_t k = 0; k < whole.objects.size(); ++k) {
+    if (k == o) continue;
+    rest->objects.push_back(whole.objects[k]);
+    parts.objects.push_back(whole.parts->objects[k]);
+    parts.poses.push_back(whole.parts->poses[k]);
+    parts.calibration.push_back(whole.parts->calibration[k]);
+    parts.view_poses.push_back(whole.parts->view_poses[k]);
+    parts.extents.push_back(whole.parts->extents[k]);
+  }
+  rest->parts = std::make_shared<const PartsModel>(std::move(parts));
+  return rest;
+}
+
+TEST(Evaluation, TakesAllOfAnObjectOutOfTheModelThatDoesNotHoldIt) {
+  const test::TemporaryFolder folder;
+  testing::write_turn(folder.path(), "a", 1, 8);
+  testing::write_turn(folder.path(), "b", 2, 8);
+  const auto sets = open_image_sets(folder.path());
+  EvaluationOptions options = small_evaluation();
+  options.learning.normalization.size = 64;
+  options.learning.parts = true;
+  options.leave_one_out = true;
+  const EvaluationReport report = evaluate(sets, options);
+  std::vector<TrainingSet> training;
+  for (const ImageSet& set : sets) training.push_back({&set, split_views(set, 2, 0).learned});
+  LearningReport learning;
+  const Model whole = learn(training, options.learning, &learning);
+  ASSERT_NE(whole.parts->calibration[0].typical_votes, whole.parts->calibration[1].typical_votes);
+  ASSERT_EQ(report.records.size(), 16U);
+  for (std::size_t i = 8; i < 16; ++i) {
+    const RegionRecord& record = report.records[i];
+    Recognizer recognize(model_without(whole, record.object, learning));
+    const auto outcomes = recognize.recognize(sets[record.object].load(record.view));
+    ASSERT_EQ(outcomes.size(), 1U);
+    EXPECT_EQ(record.evidence, outcomes[0].evidence) << i;
+    EXPECT_EQ(record.required_evidence, outcomes[0].required_evidence);
+    EXPECT_EQ(record.verdict, outcomes[0].verdict);
+  }
+}
+
+TEST(Damaged, IsAnotherPictureForEachViewAndSeedAndTheSameAgain) {
+  cv::Mat picture(96, 128, CV_8UC3);
+  cv::RNG(3).fill(picture, cv::RNG::UNIFORM, 0, 255);
+  const auto differ = [](const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) > 0.0; };
+  EXPECT_FALSE(differ(damaged(picture, {}, 4), picture));
+  for (const TestDamage& damage : {TestDamage{.shift = 4.0}, TestDamage{.scale = 0.1},
+                                   TestDamage{.rotation_deg = 10.0}, TestDamage{.occlusion = 0.2}}) {
+    TestDamage other = damage;
+    other.seed = 2;
+    EXPECT_TRUE(differ(damaged(picture, damage, 4), picture));
+    EXPECT_FALSE(differ(damaged(picture, damage, 4), damaged(picture, damage, 4)));
+    EXPECT_TRUE(differ(damaged(picture, damage, 4), damaged(picture, damage, 5)));
+    EXPECT_TRUE(differ(damaged(picture, damage, 4), damaged(picture, other, 4)));
+  }
 }
 
 TEST(Evaluation, DamagesTheViewsOfUnknownObjectsAsThoseOfKnownOnes) {

@@ -64,6 +64,13 @@ TEST(EvidenceCurve, MarksThePointInUseByWhatEachRegionRequired) {
   expect_point(evidence_curve(records).in_use, {2.0, 0.25, 0.0, 0.25});
 }
 
+TEST(EvidenceCurve, AWrongObjectBelowTheThresholdInUseIsRejectedAndNoWrongAnswer) {
+  std::vector records{known_with(3.0), known_with(1.0, 1), known_with(4.0, 1), known_with(5.0),
+                      unknown_with(1.0)};
+  for (RegionRecord& record : records) record.required_evidence = 2.0;
+  expect_point(evidence_curve(records).in_use, {2.0, 0.25, 0.0, 0.25});
+}
+
 TEST(EvidenceCurve, ThePointInUseLiesOnTheCurveWhereAllRequireTheSame) {
   std::mt19937 random(1);
   std::normal_distribution<double> draw;

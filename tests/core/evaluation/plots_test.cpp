@@ -137,6 +137,18 @@ TEST(ReliabilitySvg, ShowsEveryBinThatHoldsRegionsAndTheExpectedCalibrationError
   EXPECT_EQ(occurrences(file, "<circle"), 2U);
 }
 
+TEST(ReliabilitySvg, DrawsTheWilsonIntervalOfEachBin) {
+  // 95 % of 3 in 4: 0.3006…0.9544; of 0 in 1: 0…0.7935. Shares go from 524 up to 84, confidences from 84 to
+  // 524.
+  Reliability reliability;
+  reliability.regions = 5;
+  reliability.bins[9] = {.regions = 4, .right = 3, .mean_confidence = 0.95};
+  reliability.bins[2] = {.regions = 1, .right = 0, .mean_confidence = 0.25};
+  const std::string file = reliability_svg(reliability);
+  EXPECT_THAT(file, HasSubstr(R"(class="whisker" x1="502" y1="391.72" x2="502" y2="104.06")"));
+  EXPECT_THAT(file, HasSubstr(R"(class="whisker" x1="194" y1="524" x2="194" y2="174.88")"));
+}
+
 TEST(ConfusionSvg, ColoursEachCellThatHoldsViewsByWhatItMeans) {
   const std::vector records{
       made_record(0, 0, Verdict::recognized), made_record(0, 0, Verdict::recognized),
