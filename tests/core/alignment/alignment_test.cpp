@@ -11,11 +11,15 @@
 namespace eigenpose {
 namespace {
 
-AlignmentEigenspace learn(const test::DrawnObject& object, double step) {
-  const PartsViews views = test::turntable_views(object, step);
+std::vector<PosePicture> pictures_of(const PartsViews& views) {
   std::vector<PosePicture> pictures(views.count);
   for (std::size_t i = 0; i < views.count; ++i) make_pose_picture(views.view(i), pictures[i]);
-  return AlignmentEigenspace::learn(views.axes, pictures);
+  return pictures;
+}
+
+AlignmentEigenspace learn(const test::DrawnObject& object, double step) {
+  const PartsViews views = test::turntable_views(object, step);
+  return AlignmentEigenspace::learn(views.axes, pictures_of(views));
 }
 
 TEST(PoseScale, HasTheDerivativesOfItsWarp) {
@@ -108,6 +112,64 @@ TEST(PoseAligner, ReportsTheVarianceOfTheInformationInTheManifold) {
     const double expected =
         options.noise / (static_cast<double>(space.coarse().basis.cols()) * slope.squaredNorm());
     EXPECT_NEAR(found.q_covariance[0] / expected, 1.0, 0.25) << truth;
+  }
+}
+
+TEST(PoseAligner, ReportsPoseAndVarianceInTheUnitOfTheDof) {
+  // The same turn in degrees and in turns.
+  const test::DrawnObject object(7);
+  const PartsViews views = test::turntable_views(object, 10.0);
+  SampleAxis turns{{"table", "turns", 0.0, 1.0, true}, {}};
+  for (const double degrees : views.axes[0].samples) turns.samples.push_back(degrees / 360.0);
+  const std::vector<PosePicture> pictures = pictures_of(views);
+  const AlignmentEigenspace by_degrees = AlignmentEigenspace::learn(views.axes, pictures);
+  const AlignmentEigenspace by_turns = AlignmentEigenspace::learn({turns}, pictures);
+  PoseAligner aligner(pose_alone());
+  PosePicture picture;
+  make_pose_picture(object.view(123.0), picture);
+  const AlignedPose in_degrees = aligner.align(picture, by_degrees).front();
+  const AlignedPose in_turns = aligner.align(picture, by_turns).front();
+  EXPECT_NEAR(in_turns.q[0] * 360.0, in_degrees.q[0], 1e-2);
+  EXPECT_NEAR(in_turns.q_covariance[0] * 360.0 * 360.0 / in_degrees.q_covariance[0], 1.0, 1e-2);
+}
+
+TEST(PoseAligner, UndoesNoMoreThanFourSigmaOfAMisalignment) {
+  const test::DrawnObject object(8);
+  const AlignmentEigenspace space = learn(object, 10.0);
+  PosePicture picture;
+  make_pose_picture(object.view(100.0, 64, 3.0, -3.0), picture);
+  // Almost no noise: the prior itself hardly pulls.
+  AlignmentOptions options;
+  options.noise = 1e-9;
+  options.prior.shift = 2.0 / 64.0;
+  PoseAligner wide(options);
+  const Misalignment whole = wide.align(picture, space).front().misalignment;
+  EXPECT_NEAR(whole.dx * 64.0, 3.0, 1.0);
+  EXPECT_NEAR(whole.dy * 64.0, -3.0, 1.0);
+  options.prior.shift = 0.25 / 64.0;
+  PoseAligner narrow(options);
+  const auto& poses = narrow.align(picture, space);
+  EXPECT_NEAR(poses.front().misalignment.dx * 64.0, 1.0, 1e-9);
+  EXPECT_NEAR(poses.front().misalignment.dy * 64.0, -1.0, 1e-9);
+  for (const AlignedPose& pose : poses) {
+    EXPECT_LE(std::fabs(pose.misalignment.dx) * 64.0, 1.0 + 1e-9);
+    EXPECT_LE(std::fabs(pose.misalignment.dy) * 64.0, 1.0 + 1e-9);
+  }
+}
+
+TEST(PoseAligner, ReportsNoPoseTwice) {
+  const test::DrawnObject object(7);
+  const AlignmentEigenspace space = learn(object, 10.0);
+  AlignmentOptions options;
+  options.hopeless = 1e9;  // all minima are followed; several end at one pose
+  PoseAligner aligner(options);
+  PosePicture picture;
+  for (double truth = 4.0; truth < 360.0; truth += 22.0) {
+    make_pose_picture(object.view(truth), picture);
+    const auto& found = aligner.align(picture, space);
+    for (std::size_t i = 0; i < found.size(); ++i)
+      for (std::size_t k = 0; k < i; ++k)
+        EXPECT_GT(test::turn_error(found[i].q[0], found[k].q[0]), 3.6) << truth;
   }
 }
 
@@ -211,6 +273,23 @@ TEST(PoseAligner, ChoosesBetweenPosesByWhatTheFineScaleShows) {
     least_coarse = std::min(least_coarse, rough[1].cost - rough[0].cost);
   }
   EXPECT_GT(least_fine, 2.0 * least_coarse) << "the fine scale separates the two poses better";
+}
+
+TEST(PoseAligner, TakesPosesThatAreNotComparedFinelyToChangeAsTheBestDoes) {
+  const test::DrawnObject body(9);
+  const AlignmentEigenspace space = learn_striped(body);
+  AlignmentOptions options;
+  options.close = 0.0;  // none but the best is compared
+  PoseAligner aligner(options);
+  PosePicture picture;
+  for (const double truth : {20.0, 160.0}) {
+    make_pose_picture(striped(body, truth), picture);
+    const auto& found = aligner.align(picture, space);
+    ASSERT_GE(found.size(), 2U);
+    const double finer = found[0].fine_cost - found[0].cost;
+    EXPECT_GT(std::fabs(finer), 1e-6) << "or the sign does not show";
+    for (const AlignedPose& pose : found) EXPECT_NEAR(pose.fine_cost - pose.cost, finer, 1e-12);
+  }
 }
 
 /// A body that turns, before a background lit from the side: two DOFs.

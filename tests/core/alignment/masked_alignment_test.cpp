@@ -97,6 +97,28 @@ TEST(MaskedAligner, GivesTheSameResultWhateverItLookedAtBefore) {
   EXPECT_EQ(a.cost, b.cost);
 }
 
+TEST(MaskedAligner, ForgetsTheTrustAndTheObjectOfTheRegionBefore) {
+  const test::DrawnObject object(21);
+  const AlignmentEigenspace space = learned(object);
+  const AlignmentEigenspace other_space = learned(test::DrawnObject(22));
+  const OccludedRegion region = occluded(object, 95.0, 0);
+  const std::vector<float> all(32UL * 32UL, 1.0F);
+  const double start = 90.0;
+  MaskedAligner fresh({});
+  fresh.look(region.picture, space, region.trust);
+  const AlignedPose expected = fresh.approach(std::span(&start, 1), reach).aligned;
+  for (const auto& [before, trust] : {std::pair(&space, std::span<const float>(all)),
+                                      std::pair(&other_space, std::span<const float>(region.trust))}) {
+    MaskedAligner used({});
+    used.look(region.picture, *before, trust);
+    (void)used.approach(std::span(&start, 1), reach);
+    used.look(region.picture, space, region.trust);
+    const AlignedPose found = used.approach(std::span(&start, 1), reach).aligned;
+    EXPECT_EQ(found.q[0], expected.q[0]);
+    EXPECT_EQ(found.cost, expected.cost);
+  }
+}
+
 TEST(MaskedAligner, FindsTheGainOfARegionWhoseEnergyIsMostlyTheOccluders) {
   const test::DrawnObject object(21);
   const AlignmentEigenspace space = learned(object);
@@ -110,6 +132,21 @@ TEST(MaskedAligner, FindsTheGainOfARegionWhoseEnergyIsMostlyTheOccluders) {
   }
   EXPECT_LT(gain[0], 0.1) << "a dark occluder takes energy: the rest looks too bright";
   EXPECT_GT(gain[1], gain[0] + 0.1) << "a bright one adds energy: the rest looks too dark";
+}
+
+TEST(MaskedAligner, KeepsTheGainThatTheVisiblePixelsShow) {
+  // At the true pose the first gain is right already: no round may add it again.
+  const test::DrawnObject object(21);
+  const AlignmentEigenspace space = learned(object);
+  MaskedAligner aligner({});
+  const double truth = 90.0;
+  const OccludedRegion region = occluded(object, truth, 255);
+  aligner.look(region.picture, space, region.trust);
+  MaskedPose pose = aligner.approach(std::span(&truth, 1), reach);
+  ASSERT_GT(pose.first_gain, 0.2);
+  EXPECT_NEAR(pose.aligned.misalignment.gain, pose.first_gain, 0.25 * pose.first_gain);
+  aligner.refine(pose, reach);
+  EXPECT_NEAR(pose.aligned.misalignment.gain, pose.first_gain, 0.25 * pose.first_gain);
 }
 
 TEST(MaskedAligner, NeedsARegionFirst) {
