@@ -19,7 +19,7 @@ AppearanceMaker::AppearanceMaker(const NormalizationOptions& options)
   if (appearance_is_picture(options)) return;
   const auto pixels = static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_);
   std::size_t most = 0;
-  for (const ImageTypeSum::Part& part : parse_image_type(options.type).parts) {
+  for (const ImageTypeSum::Part& part : parse_image_type(image_type_name(options)).parts) {
     const auto bands = static_cast<std::size_t>(part.row->bands);
     parts_.push_back({part.row->make(size_), bands, static_cast<float>(std::sqrt(part.weight))});
     bands_ += bands;

@@ -12,7 +12,8 @@ namespace {
 
 const std::array rows{
     ImageTypeRow{"grey", "brightness", PictureNeed::brightness, 1, types::make_brightness},
-    ImageTypeRow{"color", "blue, green and red jointly", PictureNeed::color, 3, types::make_brightness},
+    ImageTypeRow{"color", "brightness and opponent colours jointly", PictureNeed::color, 3,
+                 types::make_opponent},
     ImageTypeRow{"gradient", "how steeply brightness or range changes", PictureNeed::any, 1,
                  types::make_gradient},
     ImageTypeRow{"laplacian", "how much a pixel differs from its neighbours", PictureNeed::any, 1,

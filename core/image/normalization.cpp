@@ -80,7 +80,7 @@ bool is_range(const NormalizationOptions& options) {
 }
 
 bool appearance_is_picture(const NormalizationOptions& options) {
-  return options.type.empty();
+  return options.type.empty() && !options.color;
 }
 
 int appearance_bands(const NormalizationOptions& options) {

@@ -20,8 +20,8 @@ namespace eigenpose {
 struct NormalizationOptions {
   int size = 64;      ///< side of the square appearance, pixels; 8…256
   bool color = true;  ///< pictures of three bands, normalised jointly; false: of one
-  /// What of the picture is compared: an image type or a sum of them (image_type.h). Empty: its brightness,
-  /// in colour or grey as `color` says.
+  /// What of the picture is compared: an image type or a sum of them (image_type.h). Empty: "color" or "grey",
+  /// as `color` says.
   std::string type = {};
   /// Pictures are ready-cut: each is one object, taken whole.
   bool cropped = false;
@@ -50,7 +50,7 @@ bool is_range(const NormalizationOptions& options);
 std::size_t appearance_length(const NormalizationOptions& options);
 /// Components a pixel: 3 or 1, more for sums of image types.
 int appearance_bands(const NormalizationOptions& options);
-/// The appearance is the picture itself: brightness, in colour or grey.
+/// The appearance is the picture itself: grey.
 bool appearance_is_picture(const NormalizationOptions& options);
 
 /// Scales cut-out regions. Holds scratch memory: one thread at a time; allocates nothing once it has seen the

@@ -9,6 +9,7 @@
 namespace eigenpose::types {
 
 std::unique_ptr<ImageType> make_brightness(int size);
+std::unique_ptr<ImageType> make_opponent(int size);
 std::unique_ptr<ImageType> make_gradient(int size);
 std::unique_ptr<ImageType> make_laplacian(int size);
 std::unique_ptr<ImageType> make_fourier(int size);

@@ -26,16 +26,34 @@ float length_of(const std::vector<float>& values) {
   return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0F));
 }
 
-TEST(AppearanceMaker, BrightnessIsThePictureItself) {
-  for (const char* type : {"grey", "color"}) {
-    const NormalizationOptions options = of_type(type);
-    AppearanceMaker maker(options);
-    EXPECT_TRUE(maker.is_picture());
-    const std::vector<float> picture = waves(picture_length(options));
-    std::vector<float> appearance(appearance_length(options));
-    EXPECT_NEAR(maker.make(picture, appearance), length_of(picture), 1e-4F * length_of(picture));
-    EXPECT_EQ(appearance, picture);
-  }
+TEST(AppearanceMaker, GreyIsThePictureItself) {
+  const NormalizationOptions options = of_type("grey");
+  AppearanceMaker maker(options);
+  EXPECT_TRUE(maker.is_picture());
+  const std::vector<float> picture = waves(picture_length(options));
+  std::vector<float> appearance(appearance_length(options));
+  EXPECT_NEAR(maker.make(picture, appearance), length_of(picture), 1e-4F * length_of(picture));
+  EXPECT_EQ(appearance, picture);
+}
+
+TEST(AppearanceMaker, ColorIsBrightnessAndTwoOpponentAxesThatCountThreeTimes) {
+  const NormalizationOptions options = of_type("color");
+  AppearanceMaker maker(options);
+  EXPECT_FALSE(maker.is_picture());
+  std::vector<float> picture(picture_length(options), 0.0F);
+  std::vector<float> appearance(appearance_length(options));
+  // Blue, green, red; white; then one that has the same energy whichever axis it lies on, but for the weight.
+  picture[0] = 1.0F;
+  picture[4] = 1.0F;
+  picture[8] = 1.0F;
+  for (std::size_t i = 9; i < 12; ++i) picture[i] = 2.0F;
+  picture[13] = -1.0F;
+  picture[14] = 1.0F;
+  maker.make(picture, appearance);
+  const float a = 1.0F / std::sqrt(3.0F), b = 3.0F / std::sqrt(2.0F), c = 3.0F / std::sqrt(6.0F);
+  const std::vector<float> expected{a,  0.0F,     2.0F * c, a,    -b,   -c,       a,   b,
+                                    -c, 6.0F * a, 0.0F,     0.0F, 0.0F, 2.0F * b, 0.0F};
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(appearance[i], expected[i], 1e-5F) << i;
 }
 
 TEST(AppearanceMaker, ReturnsTheEnergyOfWhatItMade) {
