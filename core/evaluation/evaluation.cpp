@@ -24,8 +24,7 @@ constexpr double gross_error = 45.0;
 
 /// One worker's recogniser and what it spent.
 struct Worker {
-  Worker(const std::shared_ptr<const Model>& model, const RecognizerOptions& options)
-      : recognizer(model, options) {}
+  explicit Worker(const std::shared_ptr<const RecognitionIndex>& index) : recognizer(index) {}
   Recognizer recognizer;
   RecognitionTimes spent;
   Duration load_time{};
@@ -109,11 +108,12 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
 }
 
 /// Shows every test view to the model with all objects.
-void show_known(const std::shared_ptr<const Model>& model, const Task& task, EvaluationReport& report) {
+void show_known(const std::shared_ptr<const RecognitionIndex>& index, const Task& task,
+                EvaluationReport& report) {
   const EvaluationOptions& options = task.options;
   const unsigned threads = resolved_threads(options.threads);
   std::vector<Worker> workers;
-  for (unsigned t = 0; t < threads; ++t) workers.emplace_back(model, options.recognizer);
+  for (unsigned t = 0; t < threads; ++t) workers.emplace_back(index);
   report.records.resize(task.tests.size());
   WorkMeter meter(task.progress, task.stop, "recognising", task.tests.size());
   parallel_for(threads, threads, [&](std::size_t t) {
@@ -137,7 +137,8 @@ void show_unknown(const Model& model, const Task& task, EvaluationReport& report
   std::vector<RegionRecord> records(task.tests.size());
   WorkMeter meter(task.progress, task.stop, "showing unknown objects", task.sets.size());
   parallel_for(task.sets.size(), options.threads, [&](std::size_t s) {
-    Worker worker(without_object(model, s, report.learning), options.recognizer);
+    Worker worker(std::make_shared<const RecognitionIndex>(without_object(model, s, report.learning),
+                                                           options.recognizer));
     for (std::size_t i = 0; i < task.tests.size(); ++i) {
       if (task.tests[i].set != s) continue;
       meter.check_stop();
@@ -159,15 +160,15 @@ void count_records(EvaluationReport& report) {
 }
 
 /// Shows scenes composed of test views.
-SceneReport show_scenes(const std::shared_ptr<const Model>& model, const Task& task) {
+SceneReport show_scenes(const std::shared_ptr<const RecognitionIndex>& index, const Task& task) {
   const EvaluationOptions& options = task.options;
   SceneReport report;
   std::mutex mutex;  // guards report
   WorkMeter meter(task.progress, task.stop, "composing scenes", options.scenes.count);
   const unsigned threads = resolved_threads(options.threads);
   parallel_for(threads, threads, [&](std::size_t t) {
-    SceneComposer composer(task.sets, task.tests, options.scenes, model->normalization.segmentation);
-    Recognizer recognizer(model, options.recognizer);
+    SceneComposer composer(task.sets, task.tests, options.scenes, index->model().normalization.segmentation);
+    Recognizer recognizer(index);
     for (std::size_t i = t; i < options.scenes.count; i += threads) {
       meter.check_stop();
       const ComposedScene scene = composer.compose(i);
@@ -264,13 +265,14 @@ EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOption
   }
 
   const Task task{sets, tests, options, progress, std::move(stop)};
-  show_known(model, task, report);
+  const auto index = std::make_shared<const RecognitionIndex>(model, options.recognizer);
+  show_known(index, task, report);
   report.smallest_rate = model->decision.smallest_rate();
   for (std::size_t o = 0; o < model->objects.size(); ++o) report.model_bytes += model->memory(o);
   report.model_bytes /= model->objects.size();
   if (options.leave_one_out) show_unknown(*model, task, report);
   count_records(report);
-  if (options.scenes.count > 0) report.scenes = show_scenes(model, task);
+  if (options.scenes.count > 0) report.scenes = show_scenes(index, task);
   return report;
 }
 

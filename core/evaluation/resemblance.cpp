@@ -81,13 +81,14 @@ std::vector<Resemblance> alike_poses(const Model& model, unsigned threads) {
   std::vector<Resemblance> all(model.objects.size());
   parallel_for(all.size(), threads, [&](std::size_t o) {
     const ModelObject& object = model.objects[o];
-    ManifoldSamples table(object.manifold);
+    const ManifoldSamples table(object.manifold);
+    Eigen::VectorXf squared;
     std::vector<double> other_q(table.dofs());
     Resemblance& worst = all[o];
     worst.first = worst.second = o;
     for (std::size_t s = 0; s < table.samples(); ++s) {
       const std::vector<double> q = table.pose(s);
-      const auto other = table.other_minimum(table.point(s), q, poses_apart, other_q);
+      const auto other = table.other_minimum(table.point(s), q, poses_apart, other_q, squared);
       if (!other || other->distance > model.objects[o].typical_distance) continue;
       if (worst.share == 0.0 || other->distance < worst.distance) {
         worst.distance = other->distance;

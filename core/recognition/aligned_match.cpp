@@ -8,18 +8,13 @@
 
 namespace eigenpose {
 
-SeparateSearches::SeparateSearches(std::span<const Manifold> manifolds) {
-  searches_.reserve(manifolds.size());
-  for (const Manifold& manifold : manifolds) searches_.push_back(make_search("tree", {&manifold, 1}));
-}
-
-RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ManifoldSearch& all,
-                              const SeparateSearches& separate, const ComparedObject& object, double reach) {
+RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ModelSearches& searches,
+                              const ComparedObject& object, double reach) {
   RealignedDistance result;
   std::array<ClosestPoint, 3> near;
   // The object itself and the absent one may stand before the nearest other.
   const std::size_t wanted = object.absent ? 3 : 2;
-  const std::size_t count = all.nearest_into(point, std::span(near).first(wanted), reach);
+  const std::size_t count = searches.all->nearest_into(point, std::span(near).first(wanted), reach);
   bool seen = false;
   for (std::size_t i = 0; i < count; ++i) {
     if (near[i].manifold == object.object) {
@@ -31,24 +26,21 @@ RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, co
   }
   if (!seen) {
     std::array<ClosestPoint, 1> own;
-    (void)separate[object.object].nearest_into(point, own);
+    (void)searches.separate[object.object].nearest_into(point, own);
     result.own = own[0].distance;
   }
   return result;
 }
 
-AlignedMatch::AlignedMatch(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
-                           double reach)
+AlignedMatch::AlignedMatch(const Model& model, const ModelSearches& searches, double reach)
     : model_(model),
-      all_(all),
-      separate_(separate),
+      searches_(searches),
       reach_(reach),
       aligner_([&] {
         AlignmentOptions options;
         options.noise = model.parts->noise;
         return options;
       }()),
-      mean_point_(model.eigenspace.basis.transpose() * model.eigenspace.mean),
       maker_(model.normalization),
       realigned_(maker_.is_picture() ? 0 : picture_length(model.normalization)),
       appearance_(model.eigenspace.length()),
@@ -63,8 +55,8 @@ RealignedDistance AlignedMatch::distance(std::span<const float> picture, const M
   if (typed) energy = maker_.make(realigned_, appearance);
   project_onto(model_.eigenspace.basis, appearance_, point_);
   point_ /= std::max(energy, 1e-9F);
-  point_ -= mean_point_;
-  return distance_to(point_, all_, separate_, object, reach_);
+  point_ -= searches_.mean_point;
+  return distance_to(point_, searches_, object, reach_);
 }
 
 }  // namespace eigenpose

@@ -16,6 +16,7 @@
 #include "core/alignment/alignment.h"
 #include "core/image/appearance_maker.h"
 #include "core/model/model.h"
+#include "core/recognition/model_searches.h"
 #include "core/search/search.h"
 
 namespace eigenpose {
@@ -32,30 +33,17 @@ struct ComparedObject {
   std::optional<std::size_t> absent = std::nullopt;  ///< another that counts as not learned
 };
 
-/// One search for each manifold alone. Immutable once made; const calls are thread-safe: make it once, share
-/// it.
-class SeparateSearches {
- public:
-  /// @param manifolds are kept by reference: they outlive the searches.
-  explicit SeparateSearches(std::span<const Manifold> manifolds);
-
-  [[nodiscard]] const ManifoldSearch& operator[](std::size_t manifold) const { return *searches_[manifold]; }
-
- private:
-  std::vector<std::unique_ptr<ManifoldSearch>> searches_;
-};
-
 /// Distances of a point to `object` and to the nearest of the others but `absent`, which are looked for
 /// within `reach`.
-RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ManifoldSearch& all,
-                              const SeparateSearches& separate, const ComparedObject& object, double reach);
+RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ModelSearches& searches,
+                              const ComparedObject& object, double reach);
 
 /// Aligns one region after the other. Holds scratch memory: one thread at a time.
 class AlignedMatch {
  public:
-  /// @param model has parts. @param all over all its manifolds, @param separate over each; the three outlive
-  /// this. @param reach other objects farther than this are not looked for.
-  AlignedMatch(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate, double reach);
+  /// @param model has parts. @param searches of it; both outlive this. @param reach other objects farther
+  /// than this are not looked for.
+  AlignedMatch(const Model& model, const ModelSearches& searches, double reach);
 
   /// Poses of one object that fit, best first. Valid until the next call.
   const std::vector<AlignedPose>& align(const PosePicture& picture, std::size_t object) {
@@ -71,11 +59,9 @@ class AlignedMatch {
 
  private:
   const Model& model_;
-  const ManifoldSearch& all_;
-  const SeparateSearches& separate_;
+  const ModelSearches& searches_;
   double reach_;
   PoseAligner aligner_;
-  Eigen::VectorXf mean_point_;  ///< basisᵀ mean
   AppearanceMaker maker_;
   std::vector<float> realigned_;  ///< picture
   Eigen::VectorXf appearance_;

@@ -67,6 +67,11 @@ double evidence_of(const EvidenceWeights& weights, const OccludedMatch& match) {
   return dot(weights.occluded, occluded_terms(match));
 }
 
+double lead_of_distance(const Tuning& tuning, double typical, double first, double second) {
+  const double s = std::max(typical, least_distance);
+  return 0.5 * tuning.effective_dimensions * (second * second - first * first) / (s * s);
+}
+
 double confidence_of(double best, double second) {
   // The largest exponent is taken out: none overflows.
   const double most = std::max({best, second, 0.0});

@@ -56,6 +56,10 @@ double evidence_of(const EvidenceWeights& weights, const WholeMatch& match);
 double evidence_of(const EvidenceWeights& weights, const WholeMatch& whole, const WindowsMatch& windows);
 double evidence_of(const EvidenceWeights& weights, const OccludedMatch& match);
 
+/// Log-odds of a distance over another, both of one region: the squared distances in units of their variance,
+/// e·(d₂² − d₁²)/2s², with e effective dimensions and s the typical distance.
+double lead_of_distance(const Tuning& tuning, double typical, double first, double second);
+
 /// The posterior of the best object. @param second the evidence of the next; −∞ without.
 double confidence_of(double best, double second);
 

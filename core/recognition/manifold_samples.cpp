@@ -39,7 +39,6 @@ ManifoldSamples::ManifoldSamples(const Manifold& manifold) {
     samples *= axes_[d].values.size();
   }
   points_.resize(manifold.dimensions(), static_cast<Eigen::Index>(samples));
-  squared_.resize(static_cast<Eigen::Index>(samples));
   const std::size_t m = axes_.size();
   covariance_.reserve(samples * m * m);
   std::vector<double> q(axes_.size());
@@ -70,23 +69,24 @@ std::size_t ManifoldSamples::neighbour(std::size_t sample, const Axis& axis, int
   return at + 1 < n ? sample + axis.stride : axis.dof.periodic ? begin : sample;
 }
 
-bool ManifoldSamples::is_minimum(std::size_t sample) const {
-  const float here = squared_[static_cast<Eigen::Index>(sample)];
+bool ManifoldSamples::is_minimum(const Eigen::VectorXf& squared, std::size_t sample) const {
+  const float here = squared[static_cast<Eigen::Index>(sample)];
   return std::all_of(axes_.begin(), axes_.end(), [&](const Axis& axis) {
-    return squared_[static_cast<Eigen::Index>(neighbour(sample, axis, -1))] >= here &&
-           squared_[static_cast<Eigen::Index>(neighbour(sample, axis, 1))] >= here;
+    return squared[static_cast<Eigen::Index>(neighbour(sample, axis, -1))] >= here &&
+           squared[static_cast<Eigen::Index>(neighbour(sample, axis, 1))] >= here;
   });
 }
 
 std::optional<ManifoldSamples::Fit> ManifoldSamples::other_minimum(
     const Eigen::Ref<const Eigen::VectorXf>& point, std::span<const double> q, double apart,
-    std::span<double> other_q) {
-  for (Eigen::Index s = 0; s < squared_.size(); ++s) squared_[s] = (points_.col(s) - point).squaredNorm();
+    std::span<double> other_q, Eigen::VectorXf& squared) const {
+  squared.resize(points_.cols());
+  for (Eigen::Index s = 0; s < squared.size(); ++s) squared[s] = (points_.col(s) - point).squaredNorm();
   std::optional<Fit> best;
   double best_squared = std::numeric_limits<double>::infinity();
-  for (std::size_t s = 0; s < static_cast<std::size_t>(squared_.size()); ++s) {
-    const double here = squared_[static_cast<Eigen::Index>(s)];
-    if (here >= best_squared || !is_minimum(s)) continue;
+  for (std::size_t s = 0; s < static_cast<std::size_t>(squared.size()); ++s) {
+    const double here = squared[static_cast<Eigen::Index>(s)];
+    if (here >= best_squared || !is_minimum(squared, s)) continue;
     bool far = false;
     for (std::size_t d = 0; d < axes_.size(); ++d)
       far =
@@ -99,8 +99,8 @@ std::optional<ManifoldSamples::Fit> ManifoldSamples::other_minimum(
   for (std::size_t d = 0; d < axes_.size(); ++d) other_q[d] = value(best->sample, axes_[d]);
   if (axes_.size() == 1) {
     // The parabola through three samples.
-    const double before = squared_[static_cast<Eigen::Index>(neighbour(best->sample, axes_[0], -1))];
-    const double after = squared_[static_cast<Eigen::Index>(neighbour(best->sample, axes_[0], 1))];
+    const double before = squared[static_cast<Eigen::Index>(neighbour(best->sample, axes_[0], -1))];
+    const double after = squared[static_cast<Eigen::Index>(neighbour(best->sample, axes_[0], 1))];
     const double bend = before - 2.0 * best_squared + after;
     if (bend > 0.0) {
       const double step =

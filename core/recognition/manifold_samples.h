@@ -15,7 +15,7 @@
 
 namespace eigenpose {
 
-/// Samples of one manifold on a grid. Holds scratch memory: one thread at a time; calls do not allocate.
+/// Samples of one manifold on a grid. Immutable; const calls are thread-safe.
 class ManifoldSamples {
  public:
   explicit ManifoldSamples(const Manifold& manifold);
@@ -28,9 +28,11 @@ class ManifoldSamples {
 
   /// The best local minimum of the distance to `point` that is not the valley around `q`: at least `apart` of
   /// the range away in some DOF. Refined between samples where there is one DOF. Nothing if there is none.
+  /// @param other_q gets its pose. @param squared scratch, as large as `samples()` once used: then nothing is
+  /// allocated.
   [[nodiscard]] std::optional<Fit> other_minimum(const Eigen::Ref<const Eigen::VectorXf>& point,
                                                  std::span<const double> q, double apart,
-                                                 std::span<double> other_q);
+                                                 std::span<double> other_q, Eigen::VectorXf& squared) const;
 
   /// Covariance of q where each number of the point has variance 1, at the sample next to `q`: (JᵀJ)⁻¹, m ×
   /// m, row by row. Infinite where the point does not depend on a DOF.
@@ -53,7 +55,8 @@ class ManifoldSamples {
   };
 
   [[nodiscard]] std::size_t nearest_index(const Axis& axis, double value) const;
-  [[nodiscard]] bool is_minimum(std::size_t sample) const;
+  /// @param squared distance of each sample.
+  [[nodiscard]] bool is_minimum(const Eigen::VectorXf& squared, std::size_t sample) const;
   [[nodiscard]] std::size_t neighbour(std::size_t sample, const Axis& axis, int direction) const;
   [[nodiscard]] double value(std::size_t sample, const Axis& axis) const {
     return axis.values[(sample / axis.stride) % axis.values.size()];
@@ -62,7 +65,6 @@ class ManifoldSamples {
   std::vector<Axis> axes_;
   Eigen::MatrixXf points_;          ///< K × samples
   std::vector<double> covariance_;  ///< samples × m × m
-  Eigen::VectorXf squared_;         ///< scratch: squared distance of each sample
 };
 
 }  // namespace eigenpose

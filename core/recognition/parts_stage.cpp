@@ -37,12 +37,9 @@ WholeCandidate align_whole(const PartsRecognizer::Look& look, AlignedMatch& matc
 
 double lead_of(const Model& model, const WholeCandidate& first, const WholeCandidate& second) {
   double lead = QueryWindows::count * (first.windows.discriminating - second.windows.discriminating);
-  if (tied(model, first, second)) {
-    const double typical = std::max(model.objects[first.object].typical_distance, least_distance);
-    const double farther =
-        second.distance.own * second.distance.own - first.distance.own * first.distance.own;
-    lead += 0.5 * model.decision.tuning.effective_dimensions * farther / (typical * typical);
-  }
+  if (tied(model, first, second))
+    lead += lead_of_distance(model.decision.tuning, model.objects[first.object].typical_distance,
+                             first.distance.own, second.distance.own);
   return lead;
 }
 
@@ -77,15 +74,14 @@ std::optional<PartsIdentification> identify_if_occluded(const Model& model,
   return found;
 }
 
-PartsStage::PartsStage(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
-                       HypothesisPool& pool)
-    : model_(model),
+PartsStage::PartsStage(const RecognitionIndex& index, HypothesisPool& pool)
+    : model_(index.model()),
       pool_(pool),
-      recognizer_(*model.parts, model.decision),
-      match_(model, all, separate, reach_of_others),
-      touching_(model, recognizer_),
-      picture_(model.normalization.size, model.normalization.size,
-               picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
+      recognizer_(*model_.parts, model_.decision),
+      match_(model_, index.searches(), reach_of_others),
+      touching_(model_, index.extents(), recognizer_),
+      picture_(model_.normalization.size, model_.normalization.size,
+               picture_bands(model_.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
 bool PartsStage::apart(std::size_t object, std::span<const double> a, std::span<const double> b) const {
   const Workspace& workspace = model_.objects[object].workspace;

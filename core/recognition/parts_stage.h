@@ -16,6 +16,7 @@
 #include "core/recognition/aligned_match.h"
 #include "core/recognition/outcome.h"
 #include "core/recognition/parts_recognizer.h"
+#include "core/recognition/recognition_index.h"
 #include "core/recognition/touching_objects.h"
 #include "core/search/search.h"
 
@@ -37,9 +38,8 @@ using WholeCandidates = BoundedVector<WholeCandidate, 2>;
 /// Judges regions. Holds scratch memory: one thread at a time.
 class PartsStage {
  public:
-  /// @pre model.parts is set. The model, the searches over its manifolds, and the pool outlive the stage.
-  PartsStage(const Model& model, const ManifoldSearch& all, const SeparateSearches& separate,
-             HypothesisPool& pool);
+  /// @pre the model has parts. The index and the pool outlive the stage.
+  PartsStage(const RecognitionIndex& index, HypothesisPool& pool);
 
   /// Fills everything of `outcome` but its box.
   /// @param picture as the normaliser makes it. @param nearest the object whose manifold is nearest.
@@ -109,8 +109,7 @@ WholeCandidates compare_whole(const Model& model, const PartsRecognizer::Look& l
                               const WholeRegion& region, const WholeCandidate& aligned);
 
 /// Log-odds of the first of two candidates over the second: n·(b₁ − b₂), with n windows as independent
-/// observations and b their discriminating votes; where these are tied, and the squared distances in units of
-/// their variance, e·(d₂² − d₁²)/2s², with e effective dimensions.
+/// observations and b their discriminating votes; where these are tied, and what their distances say.
 double lead_of(const Model& model, const WholeCandidate& first, const WholeCandidate& second);
 
 /// The object of a region that may be partly occluded: some windows of the object with most votes are

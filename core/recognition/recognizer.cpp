@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "core/image/appearance_maker.h"
 #include "core/image/normalization.h"
 #include "core/image/segmentation.h"
 #include "core/recognition/decision.h"
-#include "core/recognition/manifold_samples.h"
-#include "core/recognition/model_searches.h"
-#include "core/recognition/object_eigenspace_index.h"
 #include "core/recognition/parts_stage.h"
-#include "core/search/pattern_rejector.h"
 #include "core/search/search.h"
 #include "core/simd/projection.h"
 
@@ -23,8 +18,6 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock;
 
-/// How far beyond the farthest accepted distance the search looks for the runner-up.
-constexpr double search_reach = 1.5;
 /// Where the second best object is nearer than this times the best, the objects' own eigenspaces decide.
 constexpr double second_look_ratio = 2.0;
 /// A region is too small if its larger side has fewer pixels than this share of the appearance's side.
@@ -58,18 +51,13 @@ bool same_basin(const Manifold& manifold, const ClosestPoint& a, const ClosestPo
 
 /// The stages of recognition, each a function. They pass values on in the fields below.
 struct Recognizer::Impl {
-  Impl(std::shared_ptr<const Model> learned, const RecognizerOptions& options);
+  explicit Impl(std::shared_ptr<const RecognitionIndex> shared);
 
-  std::shared_ptr<const Model> model;
+  std::shared_ptr<const RecognitionIndex> index;
+  const Model& model;
   Segmenter segmenter;
   Normalizer normalizer;
   AppearanceMaker maker;
-  ModelSearches searches;
-  std::unique_ptr<ManifoldSearch> rejector;  ///< asked first, where there is one
-  ObjectEigenspaceIndex object_eigenspace_index;
-  std::vector<ManifoldSamples> poses;  ///< one an object
-  Eigen::VectorXf mean_point;          ///< basisᵀ mean
-  double search_bound = 0.0;
   std::optional<PartsStage> parts;
 
   // Scratch, reused from frame to frame.
@@ -81,6 +69,8 @@ struct Recognizer::Impl {
   Eigen::VectorXf point;    ///< its projection
   std::array<ClosestPoint, 3> closest;
   std::size_t closest_count = 0;
+  ReducedRegion reduced;
+  Eigen::VectorXf squared;  ///< distances of samples
   std::array<double, max_manifold_dofs> other_q{};
   Region whole;
   std::vector<Outcome> outcomes;
@@ -116,39 +106,28 @@ struct Recognizer::Impl {
   void describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found);
 };
 
-Recognizer::Impl::Impl(std::shared_ptr<const Model> learned, const RecognizerOptions& options)
-    : model(std::move(learned)),
-      segmenter(model->normalization.segmentation),
-      normalizer(model->normalization),
-      maker(model->normalization),
-      searches(*model, options.search),
-      object_eigenspace_index(*model),
-      mean_point(model->eigenspace.basis.transpose() * model->eigenspace.mean),
-      appearances(model->eigenspace.length(), most_projected),
-      points(model->eigenspace.components(), most_projected),
-      typed_from(maker.is_picture() ? 0 : static_cast<Eigen::Index>(picture_length(model->normalization)),
+Recognizer::Impl::Impl(std::shared_ptr<const RecognitionIndex> shared)
+    : index(std::move(shared)),
+      model(index->model()),
+      segmenter(model.normalization.segmentation),
+      normalizer(model.normalization),
+      maker(model.normalization),
+      appearances(model.eigenspace.length(), most_projected),
+      points(model.eigenspace.components(), most_projected),
+      typed_from(maker.is_picture() ? 0 : static_cast<Eigen::Index>(picture_length(model.normalization)),
                  most_projected),
-      point(model->eigenspace.components()) {
-  poses.reserve(searches.manifolds.size());
-  for (const Manifold& manifold : searches.manifolds) poses.emplace_back(manifold);
-  for (const ModelObject& object : model->objects)
-    search_bound = std::max(
-        search_bound,
-        search_reach * model->decision.distance_of(model->decision.required, object.typical_distance));
-  if (options.rejector && search_bound > 0.0 && std::isfinite(search_bound))
-    rejector =
-        std::make_unique<RejectionSearch>(searches.manifolds, RejectorOptions{.distance = search_bound});
-  if (model->parts) parts.emplace(*model, *searches.all, searches.separate, pool);
+      point(model.eigenspace.components()) {
+  if (model.parts) parts.emplace(*index, pool);
 }
 
 std::span<const Region> Recognizer::Impl::find_regions(const cv::Mat& image) {
-  if (!model->normalization.cropped) return segmenter.segment(image);
+  if (!model.normalization.cropped) return segmenter.segment(image);
   whole = {cv::Rect(0, 0, image.cols, image.rows), image.rows * image.cols, false};
   return {&whole, 1};
 }
 
 bool Recognizer::Impl::too_small(const Region& region) const {
-  return std::max(region.box.width, region.box.height) < least_side_share * model->normalization.size;
+  return std::max(region.box.width, region.box.height) < least_side_share * model.normalization.size;
 }
 
 std::span<float> Recognizer::Impl::picture() {
@@ -157,36 +136,35 @@ std::span<float> Recognizer::Impl::picture() {
 
 void Recognizer::Impl::normalize(const cv::Mat& image, std::size_t region) {
   float& energy = energies[static_cast<std::size_t>(column)];
-  energy = model->normalization.cropped ? normalizer.normalize(image, {0, 0, 0}, picture())
-                                        : normalizer.normalize(segmenter.cut_out(image, region),
-                                                               segmenter.background().level, picture());
+  energy = model.normalization.cropped ? normalizer.normalize(image, {0, 0, 0}, picture())
+                                       : normalizer.normalize(segmenter.cut_out(image, region),
+                                                              segmenter.background().level, picture());
   if (!maker.is_picture()) energy = maker.make(picture(), appearance());
 }
 
 void Recognizer::Impl::find_closest() {
-  closest_count = (rejector ? *rejector : *searches.all).nearest_into(point, closest, search_bound);
+  closest_count = index->within_reach().nearest_into(point, closest, index->reach());
   // Nothing within reach: the nearest is reported all the same.
-  if (closest_count == 0) closest_count = searches.all->nearest_into(point, std::span(closest).first(1));
+  if (closest_count == 0)
+    closest_count = index->searches().all->nearest_into(point, std::span(closest).first(1));
 }
 
 void Recognizer::Impl::look_again() {
-  const auto has_space = [&](const ClosestPoint& found) {
-    return object_eigenspace_index.has(found.manifold);
-  };
+  const ObjectEigenspaceIndex& spaces = index->object_eigenspaces();
+  const auto has_space = [&](const ClosestPoint& found) { return spaces.has(found.manifold); };
   const auto end = closest.begin() + static_cast<std::ptrdiff_t>(closest_count);
   const auto close = std::find_if(closest.begin() + 1, end, [&](const ClosestPoint& found) {
     return found.distance > second_look_ratio * closest[0].distance;
   });
   const bool doubtful = close - closest.begin() > 1;
   const auto better_pose = [&](const ClosestPoint& found) {
-    return model->objects[found.manifold].space->better_pose;
+    return model.objects[found.manifold].space->better_pose;
   };
   if (!std::all_of(closest.begin(), close, has_space) || (!doubtful && !better_pose(closest[0]))) return;
-  object_eigenspace_index.look(appearance());
+  spaces.reduce(appearance(), reduced);
   std::array<ClosestPoint, 3> seen;
   for (auto found = closest.begin(); found != close; ++found)
-    seen[static_cast<std::size_t>(found - closest.begin())] =
-        object_eigenspace_index.closest(found->manifold);
+    seen[static_cast<std::size_t>(found - closest.begin())] = spaces.closest(found->manifold, reduced);
   const auto count = close - closest.begin();
   const auto winner =
       std::min_element(seen.begin(), seen.begin() + count,
@@ -194,7 +172,7 @@ void Recognizer::Impl::look_again() {
       seen.begin();
   std::rotate(closest.begin(), closest.begin() + winner, closest.begin() + winner + 1);
   const ClosestPoint& own = seen[static_cast<std::size_t>(winner)];
-  if (better_pose(closest[0]) && same_basin(model->objects[own.manifold].manifold, own, closest[0]))
+  if (better_pose(closest[0]) && same_basin(model.objects[own.manifold].manifold, own, closest[0]))
     closest[0].q = own.q;
 }
 
@@ -203,7 +181,7 @@ void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region,
   const float energy = energies[static_cast<std::size_t>(column)];
   if (!(energy > 0.0F)) return;  // black: nothing to compare
   // Norm and mean are folded in: basisᵀ (x/‖x‖ − mean).
-  point = points.col(column) / energy - mean_point;
+  point = points.col(column) / energy - index->searches().mean_point;
   find_closest();
   Outcome& outcome = outcomes[outcome_count - 1];
   if (!parts) {
@@ -218,9 +196,9 @@ void Recognizer::Impl::judge_region(const cv::Mat& image, std::size_t region,
 
 void Recognizer::Impl::judge(Outcome& outcome) {
   const ClosestPoint& best = closest[0];
-  const DecisionModel& decision = model->decision;
+  const DecisionModel& decision = model.decision;
   const auto evidence_at = [&](double distance, std::size_t object) {
-    return evidence_of(decision.weights, WholeMatch{distance, model->objects[object].typical_distance});
+    return evidence_of(decision.weights, WholeMatch{distance, model.objects[object].typical_distance});
   };
   describe(outcome.best, best);
   if (closest_count > 1) describe(outcome.runner_up, closest[1]);
@@ -229,16 +207,17 @@ void Recognizer::Impl::judge(Outcome& outcome) {
   outcome.decide(evidence, decision.tuning);
   if (outcome.verdict == Verdict::unknown) return;
   estimate_pose(outcome, best);
-  const ModelObject& object = model->objects[best.manifold];
+  const ModelObject& object = model.objects[best.manifold];
   const std::span<double> q(other_q.data(), object.workspace.size());
-  const auto other = poses[best.manifold].other_minimum(point, outcome.best->q, poses_apart, q);
-  if (other &&
-      evidence_at(other->distance, best.manifold) > outcome.evidence - decision.tuning.ambiguous_lead)
+  const auto other =
+      index->samples(best.manifold).other_minimum(point, outcome.best->q, poses_apart, q, squared);
+  if (other && lead_of_distance(decision.tuning, object.typical_distance, best.distance, other->distance) <
+                   decision.tuning.pose_lead)
     pool.fill(outcome.other_pose, object.name, q, other->distance);
 }
 
 void Recognizer::Impl::split(const cv::Mat& image, std::size_t region, const RecognitionLimits& limits) {
-  if (model->normalization.cropped) return;
+  if (model.normalization.cropped) return;
   const SplitRegion& found = parts->split(segmenter.cut_out(image, region), segmenter.background(), limits);
   outcomes[outcome_count - 1].unfinished = found.unfinished;
   // A region recognised as one object is replaced only by objects that explain all of it.
@@ -260,10 +239,10 @@ void Recognizer::Impl::split(const cv::Mat& image, std::size_t region, const Rec
 }
 
 void Recognizer::Impl::estimate_pose(Outcome& outcome, const ClosestPoint& best) {
-  const ModelObject& object = model->objects[best.manifold];
+  const ModelObject& object = model.objects[best.manifold];
   const double sigma = std::max(best.distance, object.typical_distance) /
-                       std::sqrt(model->decision.tuning.effective_dimensions);
-  outcome.set_covariance(poses[best.manifold].covariance(outcome.best->q), sigma * sigma,
+                       std::sqrt(model.decision.tuning.effective_dimensions);
+  outcome.set_covariance(index->samples(best.manifold).covariance(outcome.best->q), sigma * sigma,
                          object.dof_observable);
 }
 
@@ -275,22 +254,24 @@ Outcome& Recognizer::Impl::next_outcome() {
 }
 
 void Recognizer::Impl::describe(std::optional<Hypothesis>& hypothesis, const ClosestPoint& found) {
-  const ModelObject& object = model->objects[found.manifold];
+  const ModelObject& object = model.objects[found.manifold];
   pool.fill(hypothesis, object.name, std::span(found.q).first(object.workspace.size()), found.distance);
 }
 
-Recognizer::Recognizer(std::shared_ptr<const Model> model, const RecognizerOptions& options) {
-  if (model == nullptr || model->objects.empty())
-    throw std::invalid_argument("a recogniser needs a model with at least one object");
-  impl_ = std::make_unique<Impl>(std::move(model), options);
+Recognizer::Recognizer(std::shared_ptr<const RecognitionIndex> index) {
+  if (index == nullptr) throw std::invalid_argument("a recogniser needs an index");
+  impl_ = std::make_unique<Impl>(std::move(index));
 }
+
+Recognizer::Recognizer(std::shared_ptr<const Model> model, const RecognizerOptions& options)
+    : Recognizer(std::make_shared<const RecognitionIndex>(std::move(model), options)) {}
 
 Recognizer::~Recognizer() = default;
 Recognizer::Recognizer(Recognizer&&) noexcept = default;
 Recognizer& Recognizer::operator=(Recognizer&&) noexcept = default;
 
 const Model& Recognizer::model() const {
-  return *impl_->model;
+  return impl_->model;
 }
 
 std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, const RecognitionLimits& limits,
@@ -303,7 +284,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, const Recog
   if (image.empty() || (image.depth() != CV_8U && image.type() != CV_16UC1))
     throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
                                 cv::typeToString(image.type()));
-  if (impl.model->normalization.color && image.channels() != 3)
+  if (impl.model.normalization.color && image.channels() != 3)
     throw std::invalid_argument(
         "the model was learned in colour, the picture is grey; learn it from grey views "
         "(NormalizationOptions::color)");
@@ -325,7 +306,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, const Recog
     }
     {
       const Lap lap(spent.project);
-      project_onto(impl.model->eigenspace.basis, impl.appearances, impl.column, impl.points);
+      project_onto(impl.model.eigenspace.basis, impl.appearances, impl.column, impl.points);
     }
     const Lap lap(spent.search);
     impl.column = 0;

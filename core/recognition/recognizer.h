@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "core/base/clock.h"
@@ -13,6 +12,7 @@
 #include "core/model/model.h"
 #include "core/recognition/limits.h"
 #include "core/recognition/outcome.h"
+#include "core/recognition/recognition_index.h"
 
 namespace eigenpose {
 
@@ -25,19 +25,13 @@ struct RecognitionTimes {
   Duration total{};
 };
 
-/// How a recogniser finds the nearest manifold. Every choice but "rbf" gives the same answers.
-struct RecognizerOptions {
-  /// "tree", "flann", "slab", or "rbf": networks in place of a search, approximate.
-  std::string search = "tree";
-  /// First exclude the manifolds that are certainly too far, by a composite rejector.
-  bool rejector = false;
-};
-
-/// Recognises objects with one model. Holds scratch memory and search trees: one thread at a time; make one
-/// for each thread. The model itself is shared.
+/// Recognises objects with one model. Holds scratch memory alone: one thread at a time; make one for each
+/// thread, all of one index.
 class Recognizer {
  public:
-  /// @throws std::invalid_argument for an unknown search.
+  /// @throws std::invalid_argument without an index.
+  explicit Recognizer(std::shared_ptr<const RecognitionIndex> index);
+  /// Makes an index of its own. @throws as RecognitionIndex.
   explicit Recognizer(std::shared_ptr<const Model> model, const RecognizerOptions& options = {});
   ~Recognizer();
   Recognizer(Recognizer&&) noexcept;

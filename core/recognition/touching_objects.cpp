@@ -15,9 +15,6 @@
 namespace eigenpose {
 namespace {
 
-/// Learned sizes that differ by less than this share of the larger side are tried as one.
-constexpr double same_extent = 0.12;
-constexpr std::size_t most_extents = 40;  ///< where there are more, sizes are distinguished less finely
 /// Share of an object's side that may be hidden: its box may reach that far beyond the region.
 constexpr double most_beyond = 0.45;
 /// A box of the wrong size loses votes. A trial is kept if it gets at least this share of the votes that the
@@ -114,42 +111,15 @@ void keep_different(std::vector<TouchingObject>& objects) {
 
 }  // namespace
 
-TouchingObjects::TouchingObjects(const Model& model, PartsRecognizer& recognizer)
+TouchingObjects::TouchingObjects(const Model& model, const ViewExtents& extents, PartsRecognizer& recognizer)
     : normalization_(model.normalization),
       parts_(*model.parts),
       decision_(model.decision),
       recognizer_(recognizer),
       normalizer_(model.normalization),
-      least_(std::numeric_limits<int>::max(), std::numeric_limits<int>::max()),
+      extents_(extents),
       picture_(model.normalization.size, model.normalization.size,
-               picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {
-  for (double same = same_extent; extents_.empty() || extents_.size() > most_extents; same *= 1.3) {
-    extents_.clear();
-    group_extents(same);
-    if (extents_.empty()) break;
-  }
-}
-
-void TouchingObjects::group_extents(double same) {
-  for (std::size_t o = 0; o < parts_.extents.size(); ++o) {
-    for (const cv::Size& size : parts_.extents[o]) {
-      if (size.empty()) continue;  // views of this object came ready-cut
-      least_ = {std::min(least_.width, size.width), std::min(least_.height, size.height)};
-      const double side = std::max(size.width, size.height);
-      const auto like = std::ranges::find_if(extents_, [&](const Extent& known) {
-        return std::abs(known.size.width - size.width) < same * side &&
-               std::abs(known.size.height - size.height) < same * side;
-      });
-      Extent& extent = like != extents_.end() ? *like : extents_.emplace_back(Extent{size, {}});
-      if (extent.objects.empty() || extent.objects.back() != o) extent.objects.push_back(o);
-    }
-  }
-}
-
-bool TouchingObjects::possible(const cv::Size& region) const {
-  return !extents_.empty() && region.width >= least_.width && region.height >= least_.height &&
-         (region.width >= 1.2 * least_.width || region.height >= 1.2 * least_.height);
-}
+               picture_bands(model.normalization) == 3 ? CV_8UC3 : CV_8UC1) {}
 
 bool TouchingObjects::may_look() {
   const bool late = limits_->region_time != Duration::max() && std::chrono::steady_clock::now() >= deadline_;
@@ -187,8 +157,8 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
   std::vector<float> picture;
   cv::Mat sums;
   if (places == Places::all) cv::integral(foreground_of(work_, background_), sums, CV_32S);
-  for (std::size_t e = 0; e < extents_.size(); ++e) {
-    const cv::Size& size = extents_[e].size;
+  for (std::size_t e = 0; e < extents_.groups().size(); ++e) {
+    const cv::Size& size = extents_.groups()[e].size;
     if ((1.0 - most_beyond) * size.width > outline.width ||
         (1.0 - most_beyond) * size.height > outline.height)
       continue;
@@ -206,7 +176,7 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
         if (places == Places::all && (corner || !filled(box, sums))) continue;  // corners were tried before
         const auto seen = look(box, picture);
         if (!seen) continue;
-        const PartsRecognizer::Votes votes = seen->vote(extents_[e].objects);
+        const PartsRecognizer::Votes votes = seen->vote(extents_.groups()[e].objects);
         const std::size_t object = votes.ranked()[0].object;
         const WindowsMatch match = votes.match(object);
         if (match.votes >= least_trial_votes * visible * match.typical_votes)
@@ -250,7 +220,7 @@ std::vector<TouchingObject> TouchingObjects::candidates(const cv::Rect& outline,
 std::vector<TouchingObject> TouchingObjects::candidates(std::span<const Trial> trials) {
   std::vector<TouchingObject> found;
   for (const Trial& trial : trials) {
-    TouchingObject object = settle(trial.box, extents_[trial.extent].objects);
+    TouchingObject object = settle(trial.box, extents_.groups()[trial.extent].objects);
     if (!object.found.best.poses.empty()) found.push_back(std::move(object));
   }
   const auto by_evidence = [](const TouchingObject& a, const TouchingObject& b) {
@@ -306,7 +276,7 @@ double TouchingObjects::complete(TouchingObject first, const cv::Mat& foreground
     const Piece piece = largest_piece(pieces);
     const double explained = 1.0 - piece.all / whole;
     way.unknown.clear();
-    if (piece.area < least_piece * least_.area()) return explained;
+    if (piece.area < least_piece * extents_.least().area()) return explained;
     way.unknown.push_back(piece.box);
     if (way.objects.size() == most_objects) return explained;
     std::vector<TouchingObject> next = candidates(piece.box, 1.0 - most_overlapped);
@@ -383,7 +353,7 @@ const SplitRegion& TouchingObjects::split(const cv::Mat& cut, const Background& 
   looks_left_ = most_looks;
   unfinished_ = false;
   result_ = {};
-  if (!possible(cut.size())) return result_;
+  if (!extents_.may_be_two(cut.size())) return result_;
   const cv::Mat foreground = foreground_of(cut, background);
   const cv::Rect outline = largest_piece(foreground).box;
   if (outline.empty()) return result_;

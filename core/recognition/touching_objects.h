@@ -19,6 +19,7 @@
 #include "core/model/model.h"
 #include "core/recognition/limits.h"
 #include "core/recognition/parts_recognizer.h"
+#include "core/recognition/view_extents.h"
 
 namespace eigenpose {
 
@@ -43,8 +44,9 @@ struct SplitRegion {
 /// Splits regions of touching objects. Holds scratch memory: one thread at a time.
 class TouchingObjects {
  public:
-  /// @param model has parts. @param recognizer of them; both outlive it.
-  TouchingObjects(const Model& model, PartsRecognizer& recognizer);
+  /// @param model has parts. @param extents of their views. @param recognizer of them; the three outlive
+  /// this.
+  TouchingObjects(const Model& model, const ViewExtents& extents, PartsRecognizer& recognizer);
 
   /// The object in this pose was learned so much smaller that the region may show another beside it.
   [[nodiscard]] bool too_large(const cv::Size& region, std::size_t object, std::span<const double> q) const;
@@ -52,11 +54,6 @@ class TouchingObjects {
   const SplitRegion& split(const cv::Mat& cut, const Background& background, const RecognitionLimits& limits);
 
  private:
-  /// Learned views of about the same size.
-  struct Extent {
-    cv::Size size;
-    std::vector<std::size_t> objects;
-  };
   /// A box that may hold an object.
   struct Trial {
     cv::Rect box;
@@ -64,9 +61,6 @@ class TouchingObjects {
     double votes = 0.0;
   };
 
-  void group_extents(double same);
-  /// A region as large as this may be two objects.
-  [[nodiscard]] bool possible(const cv::Size& region) const;
   /// Whether one more box may be looked at; else the search is unfinished.
   bool may_look();
   /// Makes the picture of a box of `work_`, and shows it to the recogniser. Nothing where it is black, or a
@@ -103,8 +97,7 @@ class TouchingObjects {
   const DecisionModel& decision_;
   PartsRecognizer& recognizer_;
   Normalizer normalizer_;
-  std::vector<Extent> extents_;
-  cv::Size least_;
+  const ViewExtents& extents_;
   Background background_;
   cv::Mat work_;  ///< the cut-out without the objects found so far
   cv::Mat crop_;

@@ -14,10 +14,8 @@ ShownView::ShownView(const Model& model, const ModelSearches& searches)
       maker_(model.normalization),
       numbers_(picture_length(model.normalization)),
       appearance_(model.eigenspace.length()),
-      point_(model.eigenspace.components()),
-      mean_point_(model.eigenspace.basis.transpose() * model.eigenspace.mean) {
-  if (model.parts)
-    aligned_.emplace(model, *searches.all, searches.separate, std::numeric_limits<double>::infinity());
+      point_(model.eigenspace.components()) {
+  if (model.parts) aligned_.emplace(model, searches, std::numeric_limits<double>::infinity());
 }
 
 void ShownView::show(const cv::Mat& picture) {
@@ -25,7 +23,7 @@ void ShownView::show(const cv::Mat& picture) {
   const float energy =
       maker_.make(numbers_, {appearance_.data(), static_cast<std::size_t>(appearance_.size())});
   project_onto(model_.eigenspace.basis, appearance_, point_);
-  point_ = point_ / std::max(energy, 1e-9F) - mean_point_;
+  point_ = point_ / std::max(energy, 1e-9F) - searches_.mean_point;
   if (aligned_) make_pose_picture(picture, pose_);
 }
 
@@ -42,8 +40,7 @@ RealignedDistance ShownView::distance(std::size_t object, std::optional<std::siz
     const Misalignment misalignment = aligned_->align(pose_, object).front().misalignment;
     return aligned_->distance(numbers_, misalignment, {object, absent});
   }
-  return distance_to(point_, *searches_.all, searches_.separate, {object, absent},
-                     std::numeric_limits<double>::infinity());
+  return distance_to(point_, searches_, {object, absent}, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace eigenpose

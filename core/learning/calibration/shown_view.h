@@ -47,7 +47,6 @@ class ShownView {
   PosePicture pose_;
   Eigen::VectorXf appearance_;
   Eigen::VectorXf point_;
-  Eigen::VectorXf mean_point_;  ///< basisᵀ mean
 };
 
 }  // namespace eigenpose

@@ -13,19 +13,6 @@ namespace {
 
 constexpr double everywhere = std::numeric_limits<double>::infinity();
 
-struct Searches {
-  explicit Searches(const Model& model)
-      : manifolds(manifolds_of(model)), all(make_search(manifolds)), separate(manifolds) {}
-  static std::vector<Manifold> manifolds_of(const Model& model) {
-    std::vector<Manifold> list;
-    for (const ModelObject& object : model.objects) list.push_back(object.manifold);
-    return list;
-  }
-  std::vector<Manifold> manifolds;
-  std::unique_ptr<ManifoldSearch> all;
-  SeparateSearches separate;
-};
-
 /// A view of an object, normalised.
 std::vector<float> picture_of(const Model& model, int kind, double angle) {
   const cv::Mat scene = testing::scene_with(kind, angle, testing::PartsWorld::knobs(), 5);
@@ -38,7 +25,7 @@ std::vector<float> picture_of(const Model& model, int kind, double angle) {
 }
 
 TEST(SeparateSearches, LookAtOneManifoldEach) {
-  const Searches searches(*testing::parts_world().model);
+  const ModelSearches searches(*testing::parts_world().model);
   const Eigen::VectorXf point = searches.manifolds[1].evaluate({{100.0}}).cast<float>();
   for (std::size_t o = 0; o < searches.manifolds.size(); ++o) {
     const auto found = searches.separate[o].nearest(point, 10);
@@ -50,8 +37,8 @@ TEST(SeparateSearches, LookAtOneManifoldEach) {
 
 TEST(AlignedMatch, MeasuresToTheOwnManifoldAndToTheNearestOther) {
   const auto& world = testing::parts_world();
-  const Searches searches(*world.model);
-  AlignedMatch match(*world.model, *searches.all, searches.separate, everywhere);
+  const ModelSearches searches(*world.model);
+  AlignedMatch match(*world.model, searches, everywhere);
   for (const auto& [kind, name] : {std::pair{1, "one"}, std::pair{2, "two"}, std::pair{3, "three"}}) {
     const std::size_t own = world.index_of(name);
     const auto picture = picture_of(*world.model, kind, 77.0);
@@ -71,13 +58,13 @@ TEST(AlignedMatch, MeasuresToTheOwnManifoldAndToTheNearestOther) {
 
 TEST(AlignedMatch, LooksForOthersWithinItsReachOnly) {
   const auto& world = testing::parts_world();
-  const Searches searches(*world.model);
+  const ModelSearches searches(*world.model);
   const std::size_t own = world.index_of("one");
   const auto picture = picture_of(*world.model, 1, 77.0);
-  AlignedMatch far(*world.model, *searches.all, searches.separate, everywhere);
+  AlignedMatch far(*world.model, searches, everywhere);
   const RealignedDistance all = far.distance(picture, {}, {own});
   for (const double reach : {0.99 * all.other->distance, 1.01 * all.other->distance}) {
-    AlignedMatch match(*world.model, *searches.all, searches.separate, reach);
+    AlignedMatch match(*world.model, searches, reach);
     const RealignedDistance found = match.distance(picture, {}, {own});
     EXPECT_EQ(found.other.has_value(), reach > all.other->distance);
     EXPECT_NEAR(found.own, all.own, 1e-6) << "the own distance is known at any reach";
@@ -86,8 +73,8 @@ TEST(AlignedMatch, LooksForOthersWithinItsReachOnly) {
 
 TEST(AlignedMatch, AnAbsentObjectIsNoRival) {
   const auto& world = testing::parts_world();
-  const Searches searches(*world.model);
-  AlignedMatch match(*world.model, *searches.all, searches.separate, everywhere);
+  const ModelSearches searches(*world.model);
+  AlignedMatch match(*world.model, searches, everywhere);
   const std::size_t own = world.index_of("one");
   const auto picture = picture_of(*world.model, 1, 77.0);
   for (std::size_t o = 0; o < 3; ++o) {
@@ -102,9 +89,9 @@ TEST(AlignedMatch, AnAbsentObjectIsNoRival) {
 
 TEST(AlignedMatch, IsNearerOnceTheMisalignmentIsUndone) {
   const auto& world = testing::parts_world();
-  const Searches searches(*world.model);
+  const ModelSearches searches(*world.model);
   const std::size_t own = world.index_of("two");
-  AlignedMatch match(*world.model, *searches.all, searches.separate, everywhere);
+  AlignedMatch match(*world.model, searches, everywhere);
   const auto picture = picture_of(*world.model, 2, 140.0);
   const int size = world.model->normalization.size;
   std::vector<float> moved(picture.size());

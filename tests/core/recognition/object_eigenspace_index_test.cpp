@@ -17,18 +17,21 @@ std::vector<float> appearance_of(const Model& model, int kind, double angle) {
   Segmenter segmenter(model.normalization.segmentation);
   EXPECT_EQ(segmenter.segment(scene).size(), 1U);
   Normalizer normalizer(model.normalization);
-  std::vector<float> appearance(picture_length(model.normalization));
-  normalizer.normalize(segmenter.cut_out(scene, 0), segmenter.background().level, appearance);
+  std::vector<float> picture(picture_length(model.normalization));
+  normalizer.normalize(segmenter.cut_out(scene, 0), segmenter.background().level, picture);
+  std::vector<float> appearance(appearance_length(model.normalization));
+  AppearanceMaker(model.normalization).make(picture, appearance);
   return appearance;
 }
 
 TEST(ObjectEigenspaceIndex, MeasuresTheDistanceBetweenWholePictures) {
   const Model& model = *testing::learned_world().model;
-  ObjectEigenspaceIndex index(model);
+  const ObjectEigenspaceIndex index(model);
+  ReducedRegion region;
   for (int kind = 1; kind <= 3; ++kind)
     for (const double angle : {11.0, 200.0}) {
       const auto appearance = appearance_of(model, kind, angle);
-      index.look(appearance);
+      index.reduce(appearance, region);
       const NormalizationOptions& options = model.normalization;
       Eigen::VectorXf reduced(static_cast<Eigen::Index>(reduced_side(options)) * reduced_side(options) *
                               appearance_bands(options));
@@ -37,7 +40,7 @@ TEST(ObjectEigenspaceIndex, MeasuresTheDistanceBetweenWholePictures) {
       reduced.normalize();
       for (std::size_t o = 0; o < model.objects.size(); ++o) {
         ASSERT_TRUE(index.has(o));
-        const ClosestPoint found = index.closest(o);
+        const ClosestPoint found = index.closest(o, region);
         EXPECT_EQ(found.manifold, o);
         // Distance from the picture to the interpolated view at the pose found, pixel by pixel.
         const ObjectEigenspace& space = *model.objects[o].space;
@@ -58,15 +61,16 @@ TEST(ObjectEigenspaceIndex, MeasuresTheDistanceBetweenWholePictures) {
 
 TEST(ObjectEigenspaceIndex, IsNearestToTheObjectShownWhateverItsEnergy) {
   const Model& model = *testing::learned_world().model;
-  ObjectEigenspaceIndex index(model);
+  const ObjectEigenspaceIndex index(model);
+  ReducedRegion region;
   const char* names[] = {"", "one", "two", "three"};
   for (int kind = 1; kind <= 3; ++kind) {
     auto appearance = appearance_of(model, kind, 130.0);
     std::vector<double> distances[2];
     for (const int dimmed : {0, 1}) {
-      index.look(appearance);
+      index.reduce(appearance, region);
       for (std::size_t o = 0; o < model.objects.size(); ++o)
-        distances[dimmed].push_back(index.closest(o).distance);
+        distances[dimmed].push_back(index.closest(o, region).distance);
       for (float& x : appearance) x *= 0.3F;
     }
     const auto nearest = std::ranges::min_element(distances[0]) - distances[0].begin();

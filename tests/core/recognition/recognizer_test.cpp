@@ -1,6 +1,9 @@
 #include "core/recognition/recognizer.h"
 
 #include <cmath>
+#include <memory>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <opencv2/imgproc.hpp>
@@ -166,7 +169,9 @@ TEST(Recognizer, RefusesPicturesTheModelCannotTake) {
   Recognizer recognize = recognizer();
   EXPECT_THROW((void)recognize.recognize(cv::Mat()), std::invalid_argument);
   EXPECT_THROW((void)recognize.recognize(cv::Mat(20, 20, CV_8UC1, cv::Scalar(0))), std::invalid_argument);
-  EXPECT_THROW(Recognizer(nullptr), std::invalid_argument);
+  EXPECT_THROW(Recognizer(std::shared_ptr<const Model>()), std::invalid_argument);
+  EXPECT_THROW(Recognizer(std::shared_ptr<const RecognitionIndex>()), std::invalid_argument);
+  EXPECT_THROW(RecognitionIndex(std::make_shared<const Model>()), std::invalid_argument);
 }
 
 TEST(Recognizer, TellsWhereItsTimeWent) {
@@ -203,6 +208,26 @@ TEST(Recognizer, MeasuresEachObjectByItsOwnYardstick) {
     EXPECT_LT(refused[0].evidence, refused[0].required_evidence);
     EXPECT_EQ(recognize.recognize(testing::scene_with(2, angle))[0].verdict, Verdict::recognized);
   }
+}
+
+TEST(Recognizer, RecognisersInSeveralThreadsShareOneIndex) {
+  const auto index = std::make_shared<const RecognitionIndex>(testing::learned_world().model);
+  std::vector<cv::Mat> scenes;
+  std::vector<double> evidence;
+  Recognizer alone(index);
+  for (int i = 0; i < 24; ++i) {
+    scenes.push_back(testing::scene_with(1 + i % 3, 15.0 * i, {}, 40 + i));
+    evidence.push_back(alone.recognize(scenes.back()).front().evidence);
+  }
+  std::vector<std::vector<double>> seen(3);
+  std::vector<std::jthread> threads;
+  for (std::vector<double>& mine : seen)
+    threads.emplace_back([&] {
+      Recognizer recognize(index);
+      for (const cv::Mat& scene : scenes) mine.push_back(recognize.recognize(scene).front().evidence);
+    });
+  threads.clear();
+  for (const auto& mine : seen) EXPECT_EQ(mine, evidence);
 }
 
 TEST(Recognizer, CallsARegionTooSmallByItsLargerSide) {
