@@ -107,6 +107,25 @@ TEST(RbfRecognizer, LearnsAnOpenAxisBesideAPeriodicOne) {
     }
 }
 
+TEST(RbfRecognizer, NamesPosesWithinTheRangeOfAnOpenAxisAlone) {
+  std::mt19937 random(46);
+  const std::vector<Manifold> list = {
+      synthetic::smooth_manifold({synthetic::axis("x", 7, false, false, random)}, 8, 2, random, 1)};
+  const RbfRecognizer networks(list);
+  const Dof& dof = list[0].axes()[0].dof;
+  std::normal_distribution<double> noise(0.0, 0.3);
+  int at_an_end = 0;
+  for (int i = 0; i < 300; ++i) {
+    Eigen::VectorXd point = list[0].evaluate({{i % 2 == 0 ? dof.lower : dof.upper}});
+    for (double& value : point) value += noise(random);
+    const double q = networks.pose(0, point)[0];
+    EXPECT_GE(q, dof.lower);
+    EXPECT_LE(q, dof.upper);
+    at_an_end += q == dof.lower || q == dof.upper ? 1 : 0;
+  }
+  EXPECT_GT(at_an_end, 0) << "or no output is beyond the range";
+}
+
 TEST(RbfNetwork, RefusesWhatDoesNotFit) {
   EXPECT_THROW(RbfNetwork::fit(Eigen::MatrixXd::Zero(2, 3), Eigen::MatrixXd::Zero(1, 4)),
                std::invalid_argument);
