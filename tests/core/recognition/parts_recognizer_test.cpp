@@ -1,6 +1,7 @@
 #include "core/recognition/parts_recognizer.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <vector>
 
@@ -76,6 +77,28 @@ TEST(PartsRecognizer, FollowsThePoseOfAnOccludedObjectWhateverTheOccluderLooksLi
           << "object " << o << " under an occluder of brightness " << brightness;
     }
   }
+}
+
+TEST(PartsRecognizer, StartsOccludedPosesOnTheSideOfTheViewThatItsNeighboursVoteFor) {
+  // Views 30° apart, poses 12° beside one: a start on the other side is 24° off, more than a round may move.
+  std::vector<PartsViews> views;
+  for (unsigned o = 0; o < 3; ++o) views.push_back(test::turntable_views(test::DrawnObject(20 + o), 30.0));
+  const PartsModel coarse = learn_parts(views, {});
+  PartsRecognizer recognizer(coarse, decision());
+  int right = 0;
+  int shown = 0;
+  for (std::size_t o = 0; o < 3; ++o) {
+    const std::array<std::size_t, 1> shortlist{o};
+    for (int i = 0; i < 12; ++i) {
+      const double truth = 30.0 * i + (i % 2 == 0 ? 12.0 : -12.0);
+      cv::Mat picture = test::DrawnObject(20 + static_cast<unsigned>(o)).view(truth);
+      picture(cv::Rect(8, 18, 16, 16)).setTo(0);
+      const PartsIdentification found = recognizer.look(picture).vote(shortlist).identify_occluded();
+      ++shown;
+      right += test::turn_error(found.best.poses.front().q[0], truth) < 8.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GE(right, shown * 9 / 10) << "of " << shown;
 }
 
 TEST(PartsRecognizer, HasMoreEvidenceForOccludedKnownObjectsThanForUnknownOnes) {
@@ -179,6 +202,23 @@ TEST(PartsRecognizer, GivesTheSameAnswerWhateverItLookedAtBefore) {
     EXPECT_EQ(a.evidence, b.evidence);
     ASSERT_EQ(a.best.poses.size(), b.best.poses.size());
     for (std::size_t i = 0; i < a.best.poses.size(); ++i) EXPECT_EQ(a.best.poses[i].q, b.best.poses[i].q);
+  }
+}
+
+TEST(PartsRecognizer, SettlesPosesAlikeWhateverItLookedAtBefore) {
+  PartsRecognizer used(model(), decision());
+  for (const unsigned o : {0U, 3U, 1U}) {
+    // Moved a little: the votes after alignment are those of other pixels.
+    const cv::Mat picture = test::DrawnObject(20 + o).view(100.0 + 7.0 * o, 64, 1.5, -1.0);
+    PartsRecognizer fresh(model(), decision());
+    const PartsAnswer a = used.look(picture).vote().settle(o);
+    const PartsAnswer b = fresh.look(picture).vote().settle(o);
+    ASSERT_EQ(a.poses.size(), b.poses.size());
+    for (std::size_t i = 0; i < a.poses.size(); ++i) {
+      EXPECT_EQ(a.poses[i].q, b.poses[i].q);
+      EXPECT_EQ(a.poses[i].votes, b.poses[i].votes);
+      EXPECT_EQ(a.poses[i].merit, b.poses[i].merit);
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 #include "core/recognition/touching_objects.h"
 
 #include <cmath>
+#include <stop_token>
 
 #include <gmock/gmock.h>
 
@@ -230,6 +231,55 @@ TEST(TouchingObjects, AreNotReportedWithoutEnoughEvidence) {
   const auto outcomes = strict.recognize(scene);
   ASSERT_EQ(outcomes.size(), 1U);
   EXPECT_EQ(outcomes[0].verdict, Verdict::unknown);
+}
+
+TEST(TouchingObjects, AreReportedUpToAQuarterOccludedOnly) {
+  // The second stands before the first, nearer and nearer; whatever is found has enough evidence.
+  Recognizer recognize(world().deciding([](DecisionModel& decision) { decision.required = -1e6; }));
+  const SceneKnobs behind = PartsWorld::knobs();
+  int split = 0;
+  for (const double angle : {5.0, 185.0})
+    for (const double beside : {30.0, 70.0}) {
+      SceneKnobs before = behind;
+      before.x += beside;
+      cv::Mat scene = testing::scene_with(1, angle, behind);
+      testing::draw_object(scene, 2, angle + 65.0, before);
+      const auto outcomes = recognize.recognize(scene);
+      if (outcomes.size() < 2) continue;
+      for (const Outcome& outcome : outcomes) {
+        if (!outcome.best) continue;
+        ++split;
+        EXPECT_LE(outcome.covered_share, 0.25) << outcome.best->object << " at " << angle << ", " << beside;
+      }
+    }
+  EXPECT_GT(split, 0);
+}
+
+TEST(TouchingObjects, AreLookedForWhereARegionIsWiderOrHigherThanTheObjectWasLearned) {
+  // Whoever is not allowed to look says that the search is unfinished.
+  std::stop_source source;
+  source.request_stop();
+  RecognitionLimits stopped;
+  stopped.stop = source.get_token();
+  const cv::Mat scene = testing::scene_with(1, 20.0, PartsWorld::knobs());
+  const cv::Rect box = only_box(scene);
+  const std::size_t one = world().index_of("one");
+  const auto looked_for = [&](double width, double height) {
+    Recognizer recognize(world().changed([&](PartsModel& parts) {
+      for (cv::Size& size : parts.extents[one])
+        size = {cvRound(box.width / width), cvRound(box.height / height)};
+    }));
+    const auto outcomes = recognize.recognize(scene, stopped);
+    EXPECT_EQ(outcomes.size(), 1U);
+    EXPECT_EQ(outcomes[0].best->object, "one");
+    return outcomes[0].unfinished;
+  };
+  ASSERT_LT(box.height, 1.25 * box.width) << "or its height is too large for its width";
+  ASSERT_LT(box.width, 1.25 * box.height);
+  EXPECT_FALSE(looked_for(1.0, 1.0));
+  EXPECT_FALSE(looked_for(1.2, 1.2));
+  EXPECT_TRUE(looked_for(1.4, 1.0));
+  EXPECT_TRUE(looked_for(1.0, 1.4));
 }
 
 TEST(TouchingObjects, DoNotReplaceAKnownObjectUnlessTheyExplainItsRegion) {
