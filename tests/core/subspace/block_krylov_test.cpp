@@ -62,6 +62,23 @@ TEST(BlockKrylov, FindsEveryCopyOfAnEigenvalueRepeatedMoreOftenThanTheBlockIsWid
             1e-4);
 }
 
+TEST(BlockKrylov, ReportsATieAtTheCutWhereTheBlockIsAsWideAsIsWanted) {
+  // A space from b vectors sees b copies. Their number being b, there may be more: the next value is as
+  // large.
+  VectorXd values = 0.01 * decaying(200);
+  values.head(5).setConstant(9.0);
+  const KnownMatrix known(values);
+  for (const Index wanted : {1, 2, 3, 4}) {
+    const EigenPairs found =
+        leading_eigenpairs(200, known.product(), {.wanted = wanted, .block = wanted, .tolerance = 1e-3});
+    ASSERT_TRUE(found.converged);
+    ASSERT_EQ(found.values.size(), wanted);
+    EXPECT_NEAR(found.values[wanted - 1], 9.0, 1e-6);
+    EXPECT_NEAR(found.next_value, 9.0, 1e-6) << wanted;
+    EXPECT_TRUE(tied_cut(found, wanted));
+  }
+}
+
 TEST(BlockKrylov, AcceptsAllEigenvaluesEqual) {
   const KnownMatrix known(VectorXd::Ones(120));
   const EigenPairs found = leading_eigenpairs(120, known.product(), {.wanted = 10, .block = 3});

@@ -90,6 +90,27 @@ TEST(ScatterFactor, JoinsAboutTheCommonMean) {
   EXPECT_THROW(join(joined, all_of(Eigen::MatrixXd::Identity(7, 3))), std::invalid_argument);
 }
 
+TEST(ScatterFactor, LeavesOutOfAJoinedWholeWhatWasLeftOutOfItsParts) {
+  const Eigen::MatrixXd views = test::views_of_rank(30, 60, 20, 3).cast<double>();
+  const ScatterFactor whole = all_of(views);
+  std::vector<ScatterFactor> parts{all_of(views.leftCols(25)), all_of(views.rightCols(35))};
+  double bound = 0.0;
+  double rest = 0.0;
+  for (ScatterFactor& part : parts) {
+    orthogonalize(part, 0.05 * part.total_scatter, 2);
+    ASSERT_GT(part.rest_bound, 0.0);
+    bound += part.rest_bound;
+    rest += part.rest();
+  }
+  ScatterFactor joined;
+  for (const ScatterFactor& part : parts) join(joined, part);
+  EXPECT_DOUBLE_EQ(joined.rest_bound, bound);
+  EXPECT_NEAR(joined.rest(), rest, 1e-12);
+  const Eigen::MatrixXd missing =
+      whole.factor * whole.factor.transpose() - joined.factor * joined.factor.transpose();
+  EXPECT_LE(symmetric_eigen(missing).values[0], joined.rest_bound + 1e-12);
+}
+
 TEST(ScatterFactor, LeavesOutNoMoreThanIsSpare) {
   ScatterFactor views = all_of(test::views_of_rank(50, 40, 12, 6).cast<double>());
   const Eigen::MatrixXd before = views.factor * views.factor.transpose();
