@@ -67,6 +67,41 @@ TEST(PartsLearning, AddsForeshortenedAndMirroredCopiesOfSparseViews) {
   for (std::size_t lane = 0; lane < 90; ++lane) EXPECT_EQ(object.lane_candidate[lane], lane / 3);
 }
 
+TEST(PartsLearning, GivesMirroredCopiesAtTheEndsOfAnOpenAxisNoMoreNeighboursThanTheirViews) {
+  // A sparse turn of 5 views at 3 places: the place runs fastest.
+  PartsViews views = test::turntable_views(test::DrawnObject(20), 24.0);
+  SampleAxis turn = views.axes[0];
+  turn.samples = {0.0, 72.0, 144.0, 216.0, 288.0};
+  views.axes = {turn, {{"x", "mm", 0.0, 2.0, false}, {0.0, 1.0, 2.0}}};
+  const PartsModel model = learn_parts({views}, {});
+  const PartsObject& object = model.objects[0];
+  ASSERT_EQ(object.candidates.size(), 30U);
+  for (int copy = 0; copy < 2; ++copy)
+    for (int v = 0; v < 15; ++v) {
+      const int c = v + 15 * copy;
+      EXPECT_EQ(object.neighbours[static_cast<std::size_t>(c)],
+                (std::array{v % 3 < 2 ? c + 1 : -1, v % 3 > 0 ? c - 1 : -1}))
+          << c;
+    }
+}
+
+TEST(PartsLearning, TakesTheTwoNearestViewsForNeighboursWherePosesAreNoGrid) {
+  PartsViews views = test::turntable_views(test::DrawnObject(20), 60.0);
+  // Whatever comes first: nearest, second nearest or farther.
+  const std::vector<double> angles{0.0, 50.0, 10.0, 30.0, 200.0, 255.0};
+  views.axes[0].samples = {0.0, 90.0, 180.0, 270.0};
+  views.poses = Eigen::Map<const Eigen::RowVectorXd>(angles.data(), 6);
+  const auto near = learn_parts({views}, {}).objects[0].neighbours;
+  ASSERT_EQ(near.size(), 12U) << "mirrored ones too: the axis is sparse";
+  EXPECT_EQ(near[0], (std::array{2, 3}));
+  EXPECT_EQ(near[6], (std::array{8, 9}));
+  EXPECT_EQ(near[1], (std::array{3, 2}));
+  EXPECT_EQ(near[2], (std::array{0, 3}));
+  EXPECT_EQ(near[3], (std::array{1, 2})) << "of equally near ones the first";
+  EXPECT_EQ(near[4], (std::array{5, 1}));
+  EXPECT_EQ(near[5], (std::array{4, 0})) << "across the seam";
+}
+
 TEST(PartsLearning, DoesNotDependOnThreads) {
   const auto views = turns(4, 20.0);
   std::vector<PartsModel> models;

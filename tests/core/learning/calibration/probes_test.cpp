@@ -36,6 +36,24 @@ TEST(Probes, ShowEveryViewAsKnownAndAsUnknown) {
   }
 }
 
+TEST(Probes, MeasureEachObjectByItsOwnYardstick) {
+  for (const auto* world : {&testing::parts_world().report, &testing::learned_world().report}) {
+    const Model& model = world == &testing::parts_world().report ? *testing::parts_world().model
+                                                                 : *testing::learned_world().model;
+    int other = 0;
+    for (const Probe& probe : world->probes) {
+      if (probe.hidden) continue;
+      EXPECT_EQ(probe.whole.typical, model.objects[probe.taken_for].typical_distance);
+      if (!probe.windows) continue;
+      const std::size_t object = probe.windows->taken_for;
+      EXPECT_EQ(probe.windows->whole.typical, model.objects[object].typical_distance);
+      EXPECT_EQ(probe.windows->windows.typical_votes, model.parts->calibration[object].typical_votes);
+      other += object != probe.taken_for ? 1 : 0;
+    }
+    EXPECT_TRUE(!model.parts || other > 0) << "or the two are never different objects";
+  }
+}
+
 TEST(Probes, KnownViewsLieNearerAndHaveMoreVotesThanUnknownOnes) {
   double known = 0.0;
   double unknown = 0.0;
