@@ -132,8 +132,6 @@ void show_known(const std::shared_ptr<const RecognitionIndex>& index, const Task
 /// Shows every test view to a model without its object.
 void show_unknown(const Model& model, const Task& task, EvaluationReport& report) {
   const EvaluationOptions& options = task.options;
-  if (task.sets.size() < 2)
-    throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
   std::vector<RegionRecord> records(task.tests.size());
   WorkMeter meter(task.progress, task.stop, "showing unknown objects", task.sets.size());
   parallel_for(task.sets.size(), options.threads, [&](std::size_t s) {
@@ -181,6 +179,16 @@ SceneReport show_scenes(const std::shared_ptr<const RecognitionIndex>& index, co
     }
   });
   return report;
+}
+
+/// @throws std::invalid_argument for what the sets cannot show, before anything is learned.
+void check_possible(std::span<const ImageSet> sets, const EvaluationOptions& options) {
+  if (options.leave_one_out && sets.size() < 2)
+    throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
+  if (options.scenes.count > 0 && std::ranges::all_of(sets, &ImageSet::cropped))
+    throw std::invalid_argument(
+        "scenes are composed of objects cut out of their views, and all views here are cropped; import them "
+        "with --views scene");
 }
 
 }  // namespace
@@ -243,6 +251,7 @@ EvaluationReport::PoseErrors EvaluationReport::pose_errors() const {
 
 EvaluationReport evaluate(std::span<const ImageSet> sets, const EvaluationOptions& options,
                           const Progress& progress, std::stop_token stop) {
+  check_possible(sets, options);
   EvaluationReport report;
   std::vector<TrainingSet> training;
   std::vector<SetView> tests;

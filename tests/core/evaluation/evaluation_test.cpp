@@ -4,8 +4,10 @@
 #include <cstdlib>
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include "core/dataset/coil_import.h"
+#include "core/dataset/image_set.h"
 #include "core/learning/calibration/decision_calibration.h"
 #include "tests/support/learned_world.h"
 
@@ -13,6 +15,7 @@ namespace eigenpose {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 TEST(SplitViews, LearnsEveryKthFromTheOffset) {
   const ImageSet& set = testing::learned_world().sets.front();
@@ -130,6 +133,30 @@ std::shared_ptr<const Model> model_without(const Model& whole, std::size_t o,
   }
   rest->parts = std::make_shared<const PartsModel>(std::move(parts));
   return rest;
+}
+
+TEST(Evaluation, RefusesWhatTheSetsCannotShowBeforeItLearns) {
+  const test::TemporaryFolder folder;
+  ImageSetWriter writer(folder.path(), "cut", turntable_workspace(), nlohmann::json::object(),
+                        {.cropped = true, .sync_every_view = false});
+  for (int i = 0; i < 6; ++i)
+    writer.add(testing::scene_with(2, 60.0 * i)(cv::Rect(40, 20, 80, 80)), {60.0 * i});
+  writer.finish();
+  const auto sets = open_image_sets(folder.path());
+  const auto refusal = [&](const EvaluationOptions& options) {
+    try {
+      (void)evaluate(sets, options, [](const ProgressUpdate&) { ADD_FAILURE() << "has begun"; });
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EvaluationOptions options = small_evaluation();
+  options.scenes.count = 1;
+  EXPECT_THAT(refusal(options), HasSubstr("--views scene"));
+  options.scenes.count = 0;
+  options.leave_one_out = true;
+  EXPECT_THAT(refusal(options), HasSubstr("two objects"));
 }
 
 TEST(Evaluation, TakesAllOfAnObjectOutOfTheModelThatDoesNotHoldIt) {
