@@ -34,6 +34,7 @@ class TrainingViewsTest : public ::testing::Test {
 TEST_F(TrainingViewsTest, NamesTheSecondViewAtAPoseByItsOwnFileAfterOthersThatCannotBeUsed) {
   const std::vector<double> angles{0.0, 60.0, 120.0, 120.01, 180.0, 240.0, 300.0};
   std::vector<cv::Mat> pictures;
+  pictures.reserve(angles.size());
   for (const double angle : angles) pictures.push_back(testing::scene_with(1, angle));
   write(pictures, angles);
   std::filesystem::remove(root() / "mug/000001.png");

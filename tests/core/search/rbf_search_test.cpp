@@ -16,6 +16,7 @@ namespace {
 std::vector<Manifold> five_curves() {
   std::mt19937 random(44);
   std::vector<Manifold> list;
+  list.reserve(5);
   for (int i = 0; i < 5; ++i)
     list.push_back(
         synthetic::smooth_manifold({synthetic::axis("table", 18, true, false, random)}, 8, 2, random, 3));
@@ -40,6 +41,7 @@ TEST(RbfSearch, NamesObjectsInTheOrderOfTheNetworkAndNoneWhereItsFirstIsBeyondTh
       return scores[static_cast<Eigen::Index>(a)] > scores[static_cast<Eigen::Index>(b)];
     });
     std::vector<double> distances;
+    distances.reserve(order.size());
     for (const std::size_t o : order)
       distances.push_back((exact - list[o].evaluate(networks.pose(o, exact))).norm());
     for (const double bound : {unbounded, 1.001 * distances[0], 0.999 * distances[0], 0.999 * distances[1]})
