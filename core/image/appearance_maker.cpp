@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/simd/pixel_arithmetic.h"
+
 namespace eigenpose {
 namespace {
 
 float energy_of(std::span<const float> numbers) {
-  double sum = 0.0;
-  for (const float value : numbers) sum += static_cast<double>(value) * value;
-  return static_cast<float>(std::sqrt(sum));
+  return std::sqrt(sum_of_squares(numbers.data(), numbers.size()));
 }
 
 }  // namespace

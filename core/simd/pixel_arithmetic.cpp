@@ -89,6 +89,34 @@ void round_scaled(const float* in, float gain, std::size_t count, std::uint8_t* 
   for (; i < count; ++i) bytes[i] = static_cast<std::uint8_t>(std::min(255.0F, in[i] * gain + half));
 }
 
+void to_opponent_axes(const float* in, std::size_t count, float weight, float* out) {
+  constexpr float root_third = 0.57735027F;
+  const float root_half = weight * 0.70710678F;
+  const float root_sixth = weight * 0.40824829F;
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const F d;
+  for (; i + lanes <= count; i += lanes) {
+    V blue;
+    V green;
+    V red;
+    hn::LoadInterleaved3(d, in + 3 * i, blue, green, red);
+    const V sum = hn::Add(green, red);
+    hn::StoreInterleaved3(hn::Mul(hn::Set(d, root_third), hn::Add(blue, sum)),
+                          hn::Mul(hn::Set(d, root_half), hn::Sub(red, green)),
+                          hn::Mul(hn::Set(d, root_sixth), hn::Sub(hn::Add(blue, blue), sum)), d, out + 3 * i);
+  }
+#endif
+  for (; i < count; ++i) {
+    const float blue = in[3 * i];
+    const float green = in[3 * i + 1];
+    const float red = in[3 * i + 2];
+    out[3 * i] = root_third * (blue + (green + red));
+    out[3 * i + 1] = root_half * (red - green);
+    out[3 * i + 2] = root_sixth * ((blue + blue) - (green + red));
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace eigenpose
 HWY_AFTER_NAMESPACE();
@@ -100,6 +128,7 @@ HWY_EXPORT(add_above_levels);
 HWY_EXPORT(sum_of_squares);
 HWY_EXPORT(largest_of);
 HWY_EXPORT(round_scaled);
+HWY_EXPORT(to_opponent_axes);
 
 void add_above_levels(const std::uint8_t* bytes, std::size_t count, const std::uint8_t* levels, float weight,
                       float* out) {
@@ -116,6 +145,10 @@ float largest_of(const float* in, std::size_t count) {
 
 void round_scaled(const float* in, float gain, std::size_t count, std::uint8_t* bytes) {
   HWY_DYNAMIC_DISPATCH(round_scaled)(in, gain, count, bytes);
+}
+
+void to_opponent_axes(const float* in, std::size_t count, float weight, float* out) {
+  HWY_DYNAMIC_DISPATCH(to_opponent_axes)(in, count, weight, out);
 }
 
 }  // namespace eigenpose

@@ -27,4 +27,8 @@ float largest_of(const float* in, std::size_t count);
 /// float. Every target gives the same bytes. @pre gain·in[i] < 2³¹.
 void round_scaled(const float* in, float gain, std::size_t count, std::uint8_t* bytes);
 
+/// out = the pixels of `in` (blue, green, red) in an orthonormal basis: (b + g + r)/√3, weight·(r − g)/√2,
+/// weight·(2b − r − g)/√6. `count` pixels. Error below 2⁻²²·weight·(|b| + |g| + |r|) each.
+void to_opponent_axes(const float* in, std::size_t count, float weight, float* out);
+
 }  // namespace eigenpose

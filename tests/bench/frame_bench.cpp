@@ -39,6 +39,11 @@ double us(Duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
 }
 
+/// Brightness, red against green, blue against both; the last two three times, as models have them.
+const cv::Matx33f opponent_axes(0.577350F, 0.577350F, 0.577350F,  //
+                                0.0F, -2.121320F, 2.121320F,      //
+                                2.449490F, -1.224745F, -1.224745F);
+
 /// The pipeline as OpenCV's functions give it.
 class PlainPipeline {
  public:
@@ -73,6 +78,7 @@ class PlainPipeline {
       cv::resize(square, small, {64, 64}, 0, 0, cv::INTER_AREA);
       cv::Mat floats;
       small.convertTo(floats, CV_32F);
+      cv::transform(floats, floats, opponent_axes);
       Eigen::Map<Eigen::VectorXf> x(reinterpret_cast<float*>(floats.data), model_.eigenspace.length());
       x.normalize();
       x -= model_.eigenspace.mean;

@@ -1,6 +1,7 @@
 /// Opponent colours.
 
 #include "core/image/types/types.h"
+#include "core/simd/pixel_arithmetic.h"
 
 namespace eigenpose::types {
 namespace {
@@ -16,19 +17,7 @@ constexpr float opponent_weight = 3.0F;
 class Opponent final : public ImageType {
  public:
   void make(const PictureView& picture, std::span<float> out) override {
-    constexpr float brightness = 0.57735027F;                     // 1/√3
-    constexpr float red_green = opponent_weight * 0.70710678F;    // 1/√2
-    constexpr float blue_yellow = opponent_weight * 0.40824829F;  // 1/√6
-    const float* in = picture.pixels.data();
-    float* to = out.data();
-    for (std::size_t i = 0; i < out.size(); i += 3) {
-      const float blue = in[i];
-      const float green = in[i + 1];
-      const float red = in[i + 2];
-      to[i] = brightness * (blue + green + red);
-      to[i + 1] = red_green * (red - green);
-      to[i + 2] = blue_yellow * (2.0F * blue - red - green);
-    }
+    to_opponent_axes(picture.pixels.data(), out.size() / 3, opponent_weight, out.data());
   }
 };
 

@@ -67,6 +67,26 @@ TEST(PixelArithmetic, SumsSquares) {
   }
 }
 
+TEST(PixelArithmetic, TurnsColoursToOpponentAxes) {
+  std::mt19937 random(5);
+  for (const std::size_t count : test::lengths) {
+    test::Unaligned<float> in(3 * count, 1);
+    test::fill_normal(in, random);
+    test::on_every_target([&] {
+      test::Unaligned<float> out(3 * count, 1, 9.0F);
+      to_opponent_axes(in.data(), count, 3.0F, out.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        const double b = in[3 * i], g = in[3 * i + 1], r = in[3 * i + 2];
+        const double error = 3.0 * 0x1p-22 * (std::fabs(b) + std::fabs(g) + std::fabs(r));
+        ASSERT_NEAR(out[3 * i], (b + g + r) / std::sqrt(3.0), error) << count << ' ' << i;
+        ASSERT_NEAR(out[3 * i + 1], 3.0 * (r - g) / std::sqrt(2.0), error) << count << ' ' << i;
+        ASSERT_NEAR(out[3 * i + 2], 3.0 * (2.0 * b - r - g) / std::sqrt(6.0), error) << count << ' ' << i;
+      }
+      EXPECT_TRUE(out.surroundings_are(9.0F));
+    });
+  }
+}
+
 TEST(PixelArithmetic, FindsTheLargestWhereverItStands) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> value(0.0F, 1.0F);
