@@ -170,6 +170,7 @@ TEST(Evaluation, TakesAllOfAnObjectOutOfTheModelThatDoesNotHoldIt) {
   options.leave_one_out = true;
   const EvaluationReport report = evaluate(sets, options);
   std::vector<TrainingSet> training;
+  training.reserve(sets.size());
   for (const ImageSet& set : sets) training.push_back({&set, split_views(set, 2, 0).learned});
   LearningReport learning;
   const Model whole = learn(training, options.learning, &learning);
