@@ -233,6 +233,12 @@ AlignmentEigenspace AlignmentEigenspace::from_parts(PoseScale coarse, PoseScale 
   return space;
 }
 
+AlignmentEigenspace AlignmentEigenspace::with_left_out_errors(std::vector<double> errors) const {
+  AlignmentEigenspace space = *this;
+  space.left_out_errors_ = std::move(errors);
+  return space;
+}
+
 void AlignmentEigenspace::make_samples() {
   const auto axes = coarse_manifold_->axes();
   const double room = std::pow(static_cast<double>(most_samples) / static_cast<double>(grid_of(axes).size()),

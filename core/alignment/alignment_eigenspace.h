@@ -76,8 +76,11 @@ class AlignmentEigenspace {
   [[nodiscard]] const Grid& sample_grid() const { return sample_grid_; }
   /// Whether the samples along a DOF close on themselves.
   [[nodiscard]] Grid::Ends ends(std::size_t dof) const { return ends_of(coarse_manifold_->axes()[dof]); }
-  /// Squared error of the spline at each learned view when that view is left out (coarse scale).
+  /// Squared error of the spline at each learned view when that view is left out (coarse scale). A model file
+  /// does not keep them.
   [[nodiscard]] const std::vector<double>& left_out_errors() const { return left_out_errors_; }
+  /// The same eigenspace with the errors that were measured when it was learned.
+  [[nodiscard]] AlignmentEigenspace with_left_out_errors(std::vector<double> errors) const;
   [[nodiscard]] std::size_t memory() const;
 
  private:

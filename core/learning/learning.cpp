@@ -48,13 +48,21 @@ void check_dimensions(const ObjectViews& object, Eigen::Index dimensions) {
               "); learn with more components, or from more views");
 }
 
-/// The pictures, object by object, as partial matching learns them. @param views outlives the result.
-std::vector<PartsViews> parts_views(const TrainingViews& views) {
+/// The pictures, object by object, as partial matching learns them. @param views outlives the result, and so
+/// does the former model, where there is one.
+std::vector<PartsViews> parts_views(std::span<const TrainingSet> sets, const TrainingViews& views,
+                                    const Model* former) {
   std::vector<PartsViews> result;
-  for (const ObjectViews& object : views.objects())
+  for (std::size_t o = 0; o < views.objects().size(); ++o) {
+    const ObjectViews& object = views.objects()[o];
     result.push_back({object.axes, object.count,
                       [&views, first = object.first](std::size_t i) { return views.picture(first + i); },
                       object.poses});
+    const TrainingSet& set = sets[views.sets()[o]];
+    if (former == nullptr || !former->parts || set.kept == nullptr || !set.kept->belong_to(*former)) continue;
+    result.back().alignment = &former->parts->poses[set.kept_object];
+    result.back().left_out_errors = set.kept->left_out_errors(set.kept_object);
+  }
   return result;
 }
 
@@ -96,7 +104,7 @@ Eigenspace learn_eigenspace(const Run& run, std::span<const TrainingSet> sets, c
   if (run.options.memory_limit > 0)
     solver.memory_limit = run.options.memory_limit > held ? run.options.memory_limit - held : 1;
   if (archive != nullptr)
-    solver.keep_products = [archive](const Eigen::MatrixXd& products) { archive->write(products); };
+    solver.keep_products = [archive](const Eigen::MatrixXd& products) { archive->keep(products); };
   return solve_eigenspace(views, solver, &run.report.solver, run.progress, run.stop);
 }
 
@@ -131,31 +139,55 @@ std::vector<ModelObject> model_objects(const TrainingViews& views, std::vector<M
 }
 
 /// Windows and alignment eigenspaces.
-std::shared_ptr<PartsModel> learn_parts_model(const Run& run, const TrainingViews& views) {
+std::shared_ptr<PartsModel> learn_parts_model(const Run& run, std::span<const TrainingSet> sets,
+                                              const TrainingViews& views) {
   PartsLearningOptions learning;
   learning.threads = run.options.threads;
-  auto parts =
-      std::make_shared<PartsModel>(learn_parts(parts_views(views), learning, run.progress, run.stop));
+  auto parts = std::make_shared<PartsModel>(
+      learn_parts(parts_views(sets, views, run.options.former), learning, run.progress, run.stop));
   for (const ObjectViews& object : views.objects()) parts->extents.push_back(object.extents);
   return parts;
 }
 
+/// The views, and their projections, K × M.
+struct Learned {
+  const TrainingViews& views;
+  const Eigen::MatrixXd& points;
+};
+
 /// The yardsticks of the objects, and the decision, from the learned views shown as new and as unknown.
-/// @param parts those of the model, where it has any.
-void calibrate(const Run& run, const TrainingViews& views, const Eigen::MatrixXd& points,
-               const std::shared_ptr<PartsModel>& parts, Model& model) {
+/// @param parts those of the model, where it has any. @param kept what is known of it already.
+/// @return what is known of it now, for an update; only with parts: without, measuring costs little.
+CalibrationRecord calibrate(const Run& run, const Learned& learned, CalibrationRecord kept,
+                            const std::shared_ptr<PartsModel>& parts, Model& model) {
+  const auto& [views, points] = learned;
   YardstickOptions yardstick;
   ProbeOptions probe;
   yardstick.threads = probe.threads = run.options.threads;
   // Without alignment, misalignment adds to every distance: what segmentation causes on average.
   if (!parts) yardstick.perturbation = {.shift = 0.015, .scale = 0.03, .turn_deg = 1.5};
-  const Yardsticks yardsticks = measure_yardsticks(model, views, points, yardstick, run.progress, run.stop);
+  yardstick.kept = kept.objects;
+  Yardsticks yardsticks = measure_yardsticks(model, views, points, yardstick, run.progress, run.stop);
   for (std::size_t o = 0; o < model.objects.size(); ++o)
     model.objects[o].typical_distance = yardsticks.typical_distance[o];
   if (parts) parts->calibration = yardsticks.windows;
   model.decision.weights = prior_weights();
-  run.report.probes = show_views(model, views, yardsticks, probe, run.progress, run.stop);
+  if (!kept.objects.empty()) {
+    drop_within_reach(kept, model, views, points);
+    probe.kept = &kept;
+  }
+  CalibrationRecord record;
+  record.shown = show_views(model, views, yardsticks, probe, run.progress, run.stop);
+  run.report.probes = probes_of(record.shown);
+  run.report.kept_probes = static_cast<std::size_t>(
+      std::ranges::count_if(kept.shown, [](const ShownProbes& shown) { return !shown.probes.empty(); }));
+  run.report.shown_views = record.shown.size() - run.report.kept_probes;
   model.decision = calibrate_decision(run.report.probes, run.options.rates);
+  if (!parts) return {};
+  record.objects = std::move(yardsticks.records);
+  record.measured_among = kept.objects.empty() ? model.objects.size() : kept.measured_among;
+  record.changes = kept.changes;
+  return record;
 }
 
 /// Whether the left-out views of each object show their poses.
@@ -238,18 +270,19 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
 
   model.objects = model_objects(views, std::move(manifolds), result.evidence, std::move(spaces));
   std::shared_ptr<PartsModel> parts;
-  if (options.parts) parts = learn_parts_model(run, views);
+  if (options.parts) parts = learn_parts_model(run, sets, views);
   model.parts = parts;
   result.parts_time = watch.lap();
 
-  calibrate(run, views, points, parts, model);
+  const CalibrationRecord calibration =
+      calibrate(run, {views, points}, known_calibration(sets, views), parts, model);
   result.calibration_time = watch.lap();
 
   model.provenance = {options.program_version, created,
                       options.image_sets,      result.solver.solver,
                       result.solver.energy,    result.solver.energy_bound};
   if (archive) {
-    result.kept_views = archive->finish();
+    result.kept_views = archive->finish(calibration, parts.get());
     if (report == nullptr) result.kept_views->commit();
   }
   result.total_time = std::chrono::steady_clock::now() - began;

@@ -40,6 +40,10 @@ struct LearningOptions {
   /// A file to keep the views and their inner products in, so that objects can join and leave the model later
   /// (training_archive.h); empty: nowhere. See LearningReport::kept_views.
   std::filesystem::path kept_views = {};
+  /// Where views are kept ones, the model that was learned with them: alignment eigenspaces, which depend on
+  /// an object's own views alone, are taken from it. Null, or another model: they are learned again. Outlives
+  /// the call.
+  const Model* former = nullptr;
   /// Kept in the model's provenance.
   std::string image_sets;
   std::string program_version;
@@ -51,6 +55,8 @@ struct LearningReport {
   SolverReport solver;
   std::vector<PoseEvidence> evidence;  ///< in the order of the model's objects
   std::vector<Probe> probes;           ///< learned views shown as new and as unknown
+  std::size_t kept_probes = 0;         ///< views whose probes a former calibration made
+  std::size_t shown_views = 0;         ///< views that were shown now: the others
   Duration normalize_time{};
   Duration eigenspace_time{};
   Duration manifold_time{};

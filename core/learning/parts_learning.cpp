@@ -119,6 +119,13 @@ std::vector<Lane> make_lanes(const PartsViews& views, Copies copies, PartsObject
   return lanes;
 }
 
+AlignmentEigenspace learn_alignment(const PartsViews& views) {
+  if (views.alignment != nullptr) return views.alignment->with_left_out_errors(views.left_out_errors);
+  std::vector<PosePicture> pictures(views.count);
+  for (std::size_t v = 0; v < views.count; ++v) make_pose_picture(views.view(v), pictures[v]);
+  return AlignmentEigenspace::learn(views.axes, pictures, views.poses);
+}
+
 double median_left_out_error(const std::vector<AlignmentEigenspace>& spaces) {
   std::vector<double> medians;
   for (const AlignmentEigenspace& space : spaces) {
@@ -209,9 +216,7 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
     alignment_meter.check_stop();
     model.objects[o].store = WindowStore(windows[o], model.scale);
     windows[o].clear();
-    std::vector<PosePicture> pictures(objects[o].count);
-    for (std::size_t v = 0; v < objects[o].count; ++v) make_pose_picture(objects[o].view(v), pictures[v]);
-    model.poses[o] = AlignmentEigenspace::learn(objects[o].axes, pictures, objects[o].poses);
+    model.poses[o] = learn_alignment(objects[o]);
     model.view_poses[o] = objects[o].poses.size() > 0 ? objects[o].poses : grid_poses(objects[o].axes);
     alignment_meter.finished(1);
   });

@@ -20,6 +20,9 @@ struct PartsViews {
   std::size_t count = 0;
   std::function<cv::Mat(std::size_t)> view;  ///< called from several threads
   Eigen::MatrixXd poses = {};                ///< as ObjectViews::poses
+  /// Its alignment eigenspace where these views were learned before; else null. Outlives the call.
+  const AlignmentEigenspace* alignment = nullptr;
+  std::vector<double> left_out_errors = {};  ///< of that eigenspace
 };
 
 struct PartsLearningOptions {

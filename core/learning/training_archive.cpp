@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/dataset/natural_order.h"
+#include "core/learning/calibration_file.h"
 #include "core/model/hdf5_file.h"
 #include "core/model/hdf5_links.h"
 #include "core/model/hdf5_output.h"
@@ -16,7 +17,7 @@
 namespace eigenpose {
 namespace {
 
-constexpr SealedFormat views_format{"eigenpose views\n", 1,
+constexpr SealedFormat views_format{"eigenpose views\n", 2,
                                     "is no file of kept views; 'eigenpose learn --keep-views' makes them",
                                     "learn the model again from its image sets, with --keep-views"};
 
@@ -67,6 +68,13 @@ void write_object(const Hdf5Group& group, const TrainingViews& views, const Obje
   const Hdf5Group axes = group.make_group("axes");
   for (std::size_t a = 0; a < object.axes.size(); ++a)
     write_axis(axes.make_group(numbered(a)), object.axes[a]);
+}
+
+void write_errors(const Hdf5Group& object, const std::vector<double>& errors) {
+  if (errors.empty()) return;
+  const auto count = static_cast<Eigen::Index>(errors.size());
+  object.write("left_out_errors",
+               Eigen::MatrixXd(Eigen::Map<const Eigen::MatrixXd>(errors.data(), 1, count)));
 }
 
 /// Everything but pictures and energies.
@@ -198,6 +206,21 @@ Eigen::MatrixXd TrainingArchive::products() const {
   });
 }
 
+std::vector<double> TrainingArchive::left_out_errors(std::size_t o) const {
+  return with_hdf5(file_, [&] {
+    const Hdf5Group object = open_->root.open_group("objects").open_group(numbered(o));
+    if (!object.has("left_out_errors")) return std::vector<double>();
+    const Eigen::MatrixXd errors = object.read_doubles("left_out_errors");
+    if (errors.size() != static_cast<Eigen::Index>(objects_[o].count) || !errors.allFinite())
+      throw Hdf5Failure("has objects whose parts do not fit together");
+    return std::vector<double>(errors.data(), errors.data() + errors.size());
+  });
+}
+
+CalibrationRecord TrainingArchive::calibration() const {
+  return with_hdf5(file_, [&] { return read_calibration(open_->root, objects_); });
+}
+
 TrainingArchiveWriter::TrainingArchiveWriter(const std::filesystem::path& file, const TrainingViews& views,
                                              const LearningOptions& options, std::string created)
     : file_(std::make_unique<AtomicFile>(file)),
@@ -205,21 +228,32 @@ TrainingArchiveWriter::TrainingArchiveWriter(const std::filesystem::path& file, 
       options_(options),
       created_(std::move(created)) {}
 
-void TrainingArchiveWriter::write(const Eigen::MatrixXd& products) {
+void TrainingArchiveWriter::keep(const Eigen::MatrixXd& products) {
+  products_ = products.rows();
+  const auto bytes = sizeof(double) * static_cast<std::size_t>(products.size());
+  put_aside_ = std::make_unique<ScratchFile>(options_.scratch_folder, bytes);
+  put_aside_->write(0, {reinterpret_cast<const std::uint8_t*>(products.data()), bytes});
+}
+
+std::unique_ptr<AtomicFile> TrainingArchiveWriter::finish(const CalibrationRecord& calibration,
+                                                          const PartsModel* parts) {
   write_hdf5(*file_, seal_size, [&](const Hdf5Group& root) {
     root.write("created", created_);
     write_options(root.make_group("options"), options_);
     const Hdf5Group objects = root.make_group("objects");
-    for (std::size_t o = 0; o < views_.objects().size(); ++o)
-      write_object(objects.make_group(numbered(o)), views_, views_.objects()[o]);
-    if (products.size() > 0) root.write("products", products);
+    for (std::size_t o = 0; o < views_.objects().size(); ++o) {
+      const Hdf5Group object = objects.make_group(numbered(o));
+      write_object(object, views_, views_.objects()[o]);
+      if (parts != nullptr) write_errors(object, parts->poses[o].left_out_errors());
+    }
+    if (!calibration.objects.empty()) write_calibration(root, calibration);
+    if (!put_aside_) return;
+    Eigen::MatrixXd products(products_, products_);
+    put_aside_->read(0, {reinterpret_cast<std::uint8_t*>(products.data()),
+                         sizeof(double) * static_cast<std::size_t>(products.size())});
+    root.write("products", products);
   });
   seal_file(views_format, *file_);
-  written_ = true;
-}
-
-std::unique_ptr<AtomicFile> TrainingArchiveWriter::finish() {
-  if (!written_) write({});
   file_->prepare([](const std::filesystem::path& part) { const TrainingArchive readable(part); });
   return std::move(file_);
 }
@@ -247,21 +281,40 @@ std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<con
   return sets;
 }
 
+namespace {
+
+/// The first of the sets whose views are kept, or none.
+const TrainingArchive* archive_of(std::span<const TrainingSet> sets) {
+  const auto first = std::ranges::find_if(sets, [](const TrainingSet& s) { return s.kept != nullptr; });
+  return first == sets.end() ? nullptr : first->kept;
+}
+
+}  // namespace
+
 KnownProducts known_products(std::span<const TrainingSet> sets, const TrainingViews& views) {
   KnownProducts known;
-  const auto first =
-      std::find_if(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.kept != nullptr; });
-  if (first == sets.end()) return known;
-  known.products = first->kept->products();
+  const TrainingArchive* kept = archive_of(sets);
+  if (kept == nullptr) return known;
+  known.products = kept->products();
   if (known.products.size() == 0) return known;
   for (std::size_t o = 0; o < views.objects().size(); ++o) {
     const TrainingSet& set = sets[views.sets()[o]];
     for (std::size_t i = 0; i < views.objects()[o].count; ++i)
-      known.rows.push_back(set.kept == first->kept
-                               ? static_cast<Eigen::Index>(first->kept->objects()[set.kept_object].first + i)
-                               : -1);
+      known.rows.push_back(
+          set.kept == kept ? static_cast<Eigen::Index>(kept->objects()[set.kept_object].first + i) : -1);
   }
   return known;
+}
+
+CalibrationRecord known_calibration(std::span<const TrainingSet> sets, const TrainingViews& views) {
+  const TrainingArchive* kept = archive_of(sets);
+  if (kept == nullptr) return {};
+  std::vector<std::optional<std::size_t>> places(kept->objects().size());
+  for (std::size_t o = 0; o < views.objects().size(); ++o) {
+    const TrainingSet& set = sets[views.sets()[o]];
+    if (set.kept == kept) places[set.kept_object] = o;
+  }
+  return carry_over(kept->calibration(), places, views.objects().size());
 }
 
 }  // namespace eigenpose

@@ -9,8 +9,13 @@
 ///     /options         attributes solver, components, energy, …; normalization: as in a model
 ///     /objects/0000…   attributes name, cropped; pictures (bytes, view after view); energies (n); extents
 ///     (n×2);
-///                      axes/0… as in a model; poses (n×m) where the views are no grid
+///                      left_out_errors (n) of the alignment eigenspace; axes/0… as in a model; poses (n×m)
+///                      where the views are no grid
+///     /calibration     what calibration measured (calibration_file.h); only of models with parts
 ///     /products        inner products of all views, M × M; only where the gram solver made them
+///
+/// With the products and the record of the calibration, an update measures what concerns the objects that
+/// join, and what they change.
 ///
 /// For 3600 colour views of 64 × 64: 44 MB of pictures and 104 MB of products.
 
@@ -23,7 +28,9 @@
 #include <Eigen/Core>
 
 #include "core/base/atomic_file.h"
+#include "core/base/scratch_file.h"
 #include "core/dataset/image_set.h"
+#include "core/learning/calibration/calibration_record.h"
 #include "core/learning/learning.h"
 #include "core/learning/training_views.h"
 #include "core/subspace/gram.h"
@@ -50,8 +57,14 @@ class TrainingArchive {
   /// The pictures of object o, view after view, and the energy of each view's appearance.
   /// @throws FileError when there are not that many.
   void read(std::size_t o, std::span<std::uint8_t> pictures, std::span<float> energies) const;
+  /// Of the alignment eigenspace of object o, AlignmentEigenspace::left_out_errors; none where the model has
+  /// no parts.
+  /// @throws FileError.
+  [[nodiscard]] std::vector<double> left_out_errors(std::size_t o) const;
   /// Inner products of all views, object after object; 0 × 0 where there are none. @throws FileError.
   [[nodiscard]] Eigen::MatrixXd products() const;
+  /// What calibration measured; empty where nothing was kept. @throws FileError.
+  [[nodiscard]] CalibrationRecord calibration() const;
 
  private:
   struct File;
@@ -69,18 +82,20 @@ class TrainingArchiveWriter {
   /// @param views outlives the writer.
   TrainingArchiveWriter(const std::filesystem::path& file, const TrainingViews& views,
                         const LearningOptions& options, std::string created);
-  /// At most once. @param products 0 × 0 where there are none. @throws FileError.
-  void write(const Eigen::MatrixXd& products);
-  /// Writes what is not written yet and verifies it. @return the file, which appears, or replaces the former
-  /// one, when it is committed. At most once. @throws FileError.
-  [[nodiscard]] std::unique_ptr<AtomicFile> finish();
+  /// Puts the inner products aside, on disk. @throws FileError.
+  void keep(const Eigen::MatrixXd& products);
+  /// Writes and verifies. @param parts of the model, or null. @return the file, which appears, or replaces
+  /// the former one, when it is committed. At most once. @throws FileError.
+  [[nodiscard]] std::unique_ptr<AtomicFile> finish(const CalibrationRecord& calibration,
+                                                   const PartsModel* parts);
 
  private:
   std::unique_ptr<AtomicFile> file_;
   const TrainingViews& views_;
   LearningOptions options_;
   std::string created_;
-  bool written_ = false;
+  Eigen::Index products_ = 0;               ///< rows of the inner products
+  std::unique_ptr<ScratchFile> put_aside_;  ///< they themselves
 };
 
 /// The kept objects without those that leave, and the image sets that join, in the order of
@@ -94,5 +109,9 @@ std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<con
 /// The kept products of views that stand in `views`, which was made from `sets`. No rows where there are
 /// none.
 KnownProducts known_products(std::span<const TrainingSet> sets, const TrainingViews& views);
+
+/// What of the kept calibration is good for these sets. Empty where there is none, and where too much
+/// changed.
+CalibrationRecord known_calibration(std::span<const TrainingSet> sets, const TrainingViews& views);
 
 }  // namespace eigenpose

@@ -1,8 +1,10 @@
 #include "core/windows/windows.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -17,6 +19,27 @@ namespace {
 constexpr float soft_mass = 0.2F;      // a window with less gradient than this fades out
 constexpr float soft_energy = 0.2F;    // likewise for brightness
 constexpr float chroma_weight = 4.0F;  // colour against brightness
+
+/// The gradient mass of every window, row by row: that of its cells, each summed once.
+void gradient_masses(const OrientationGrid& map, std::span<float> masses) {
+  constexpr int cells = OrientationGrid::side;
+  constexpr int n = WindowGrid::window;
+  std::array<float, std::size_t{cells} * (cells - n + 1)> across;  // of n cells side by side
+  for (int r = 0; r < cells; ++r) {
+    std::array<float, cells> cell{};
+    for (int c = 0; c < cells; ++c)
+      cell[static_cast<std::size_t>(c)] =
+          std::accumulate(map.orientation_at(r, c), map.orientation_at(r, c) + OrientationGrid::bins, 0.0F);
+    for (int c = 0; c < WindowGrid::side; ++c)
+      across[static_cast<std::size_t>(r * WindowGrid::side + c)] =
+          std::accumulate(cell.begin() + c, cell.begin() + c + n, 0.0F);
+  }
+  for (int p = 0; p < WindowGrid::positions; ++p) {
+    float sum = 0.0F;
+    for (int r = 0; r < n; ++r) sum += across[static_cast<std::size_t>(p + r * WindowGrid::side)];
+    masses[static_cast<std::size_t>(p)] = sum;
+  }
+}
 
 }  // namespace
 
@@ -78,11 +101,7 @@ WindowSpace WindowSpace::learn(const std::vector<OrientationGrid>& maps, unsigne
   std::vector<float> scratch(static_cast<std::size_t>(length));
   std::vector<float> masses(maps.size() * WindowGrid::positions);
   parallel_for(maps.size(), threads, [&](std::size_t m) {
-    std::vector<float> vector(static_cast<std::size_t>(length));
-    for (int p = 0; p < WindowGrid::positions; ++p) {
-      masses[m * WindowGrid::positions + static_cast<std::size_t>(p)] =
-          window_vector(maps[m], p / WindowGrid::side, p % WindowGrid::side, vector.data());
-    }
+    gradient_masses(maps[m], std::span(masses).subspan(m * WindowGrid::positions, WindowGrid::positions));
   });
   const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
   std::vector<float> sorted = masses;
@@ -146,19 +165,32 @@ void WindowSpace::project(const OrientationGrid& map, int stride, Eigen::MatrixX
   const int per_side = (WindowGrid::side - 1) / stride + 1;
   const int count = per_side * per_side;
   constexpr int longest = window_length(3);
-  float vector[longest];
+  constexpr int together = 6;
+  float vectors[longest * together];
   out.resize(WindowGrid::components, count);
   if (masses != nullptr) {
     masses->resize(static_cast<std::size_t>(count));
   }
-  for (int i = 0; i < count; ++i) {
-    const float mass = window_vector(map, i / per_side * stride, i % per_side * stride, vector);
-    multiply_transposed(basis_.data(), length(), WindowGrid::components, vector, out.col(i).data());
-    out.col(i) -= offset_;
-    if (masses != nullptr) {
-      (*masses)[static_cast<std::size_t>(i)] = mass;
+  for (int first = 0; first < count; first += together) {
+    const int n = std::min(together, count - first);
+    for (int k = 0; k < n; ++k) {
+      const int i = first + k;
+      const float mass =
+          window_vector(map, i / per_side * stride, i % per_side * stride, vectors + k * length());
+      if (masses != nullptr) {
+        (*masses)[static_cast<std::size_t>(i)] = mass;
+      }
+    }
+    if (n == together) {
+      multiply_transposed_six(basis_.data(), length(), WindowGrid::components, vectors, out.col(first).data(),
+                              WindowGrid::components);
+    } else {
+      for (int k = 0; k < n; ++k)
+        multiply_transposed(basis_.data(), length(), WindowGrid::components, vectors + k * length(),
+                            out.col(first + k).data());
     }
   }
+  out.colwise() -= offset_;
 }
 
 }  // namespace eigenpose

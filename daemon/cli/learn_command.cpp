@@ -42,10 +42,11 @@ Examples:
 
 The model is written at once when all is learned; a former model of that name stays until then.
 
---keep-views writes FILE.views beside the model: the normalised views and their inner products. --update makes of it
-the very model that would be learned anew from all image sets, with the options that it was learned with. It reads
-the images of new objects alone; the folders of the others may be gone. To learn an object anew, remove it and let it
-join in one command.)";
+--keep-views writes FILE.views beside the model: the normalised views, their inner products and what calibration
+measured at them. --update makes of it the model that would be learned anew from all image sets, with the options that
+it was learned with. It reads the images of new objects alone; the folders of the others may be gone. Old views are
+measured again where an object that joined or left is near them; all of them, once a quarter of the objects has
+changed. To learn an object anew, remove it and let it join in one command.)";
 
 struct LearnOptions {
   std::string sets;
@@ -108,6 +109,9 @@ void print(const Model& model, const LearningReport& report, const std::string& 
       std::printf("left-out views are found within %.1f %s (median)\n", error,
                   object.workspace[0].unit.c_str());
   }
+  if (report.kept_probes > 0)
+    std::printf("calibrated from %zu views shown now and %zu shown to a former model\n", report.shown_views,
+                report.kept_probes);
   if (!report.solver.note.empty()) std::printf("note: %s\n", report.solver.note.c_str());
   std::printf("learned %zu objects from %zu views in %.1f s: %zu dimensions by %s keep %s\n",
               model.objects.size(), report.views, seconds(report.total_time), report.solver.components,
@@ -126,6 +130,7 @@ std::filesystem::path views_file(const std::string& model) {
 struct Lesson {
   std::vector<ImageSet> images;
   std::vector<LeftOut> left_out;  ///< sets that could not be opened
+  std::unique_ptr<Model> former;  ///< that is updated
   std::unique_ptr<TrainingArchive> kept;
   std::vector<TrainingSet> sets;
   LearningOptions options;
@@ -145,13 +150,14 @@ Lesson next_lesson(const LearnOptions& options) {
   if (options.sets.empty() && options.remove.empty())
     throw ConfigError("--update: name a folder of image sets that join, or objects that leave with --remove");
   Lesson lesson;
-  const Model former = load_model(options.update);
+  lesson.former = std::make_unique<Model>(load_model(options.update));
   lesson.kept = std::make_unique<TrainingArchive>(views_file(options.update));
-  if (!lesson.kept->belong_to(former))
+  if (!lesson.kept->belong_to(*lesson.former))
     throw FileError(lesson.kept->file(),
                     "does not belong to " + options.update +
                         ", which was learned anew since; learn it from its image sets, with --keep-views");
   lesson.options = lesson.kept->options();
+  lesson.options.former = lesson.former.get();
   if (!options.sets.empty()) {
     lesson.images = open_learned_sets(options.sets, options.learning, lesson.left_out);
     const std::string folder = absolute_folder(options.sets);

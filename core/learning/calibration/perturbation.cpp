@@ -16,6 +16,17 @@ Misalignment Perturbation::draw(SeededRandom& random) const {
   return m;
 }
 
+Misalignment Perturbation::of(std::string_view object, std::size_t view) const {
+  SeededRandom random(seed_of(object, view));
+  return draw(random);
+}
+
+std::uint32_t seed_of(std::string_view object, std::size_t view) {
+  std::uint32_t hash = 2166136261U;  // FNV-1a
+  for (const char c : object) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+  return hash + static_cast<std::uint32_t>(view);
+}
+
 cv::Mat displaced(const cv::Mat& picture, const Misalignment& by) {
   const double enlarge = 1.0 + by.scale;
   const double cosine = enlarge * std::cos(by.rotation);

@@ -2,6 +2,10 @@
 
 /// Random misalignment, as imperfect segmentation causes it.
 
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
 #include <opencv2/core.hpp>
 
 #include "core/alignment/misalignment.h"
@@ -17,7 +21,12 @@ struct Perturbation {
 
   /// One draw: four numbers of the sequence. Its gain is 0.
   [[nodiscard]] Misalignment draw(SeededRandom& random) const;
+  /// The draw for one view: the same wherever it is shown, whatever other objects there are.
+  [[nodiscard]] Misalignment of(std::string_view object, std::size_t view) const;
 };
+
+/// The seed of what is drawn for a view. Depends on no other object.
+std::uint32_t seed_of(std::string_view object, std::size_t view);
 
 /// `picture` with a misalignment applied, about its middle; beyond its edge it goes on as it ends. Bilinear;
 /// 16-bit pictures (ranges) take the nearest pixel, as a mean of distances with "not measured" is neither.

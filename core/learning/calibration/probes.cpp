@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <utility>
+#include <string>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -15,11 +15,20 @@
 namespace eigenpose {
 namespace {
 
-/// A learned view.
+/// A learned view, and what it is shown to beside the whole region's match.
 struct View {
-  std::size_t object;
-  std::size_t view;
+  std::size_t object = 0;
+  std::size_t view = 0;
+  bool windows = false;
+  bool hidden = false;                ///< once more, with a part hidden
+  const ShownProbes* kept = nullptr;  ///< what is known of it already; null: it is to be shown
 };
+
+/// A view that is known, halfway between learned ones.
+WholeMatch known_match(const Model& model, const Yardsticks& yardsticks, std::size_t object,
+                       std::size_t view) {
+  return {std::sqrt(yardsticks.squared[object][view]), model.objects[object].typical_distance};
+}
 
 /// Shows views of one object after the other. One thread at a time.
 class Prober {
@@ -30,21 +39,23 @@ class Prober {
     if (model.parts) recognizer_.emplace(*model.parts, model.decision);
   }
 
-  /// To the whole region's match, and to the windows where asked for.
-  enum class To { whole, windows };
-  void show(const View& view, To to, std::vector<Probe>& probes);
-  void show_hidden(const View& view, std::vector<Probe>& probes);
+  ShownProbes show(const View& view);
 
  private:
+  [[nodiscard]] const std::string& name_of(const View& view) const {
+    return views_.objects()[view.object].object;
+  }
   [[nodiscard]] cv::Mat learned(const View& view) const {
     return views_.picture(views_.objects()[view.object].first + view.view);
   }
   [[nodiscard]] cv::Mat perturbed(const View& view) const {
-    return displaced(learned(view), perturbation_of(yardsticks_.perturbation, view.object, view.view));
+    return displaced(learned(view), yardsticks_.perturbation.of(name_of(view), view.view));
   }
-  [[nodiscard]] Probe known_probe(const View& view) const;
-  void show_known(const View& view, const cv::Mat& picture, Probe& probe);
-  void show_unknown(const View& view, To to, std::vector<Probe>& probes);
+  void show_known(const View& view, ShownProbes& shown);
+  void show_unknown(const View& view, ShownProbes& shown);
+  void show_hidden(const View& view, ShownProbes& shown);
+  /// Notes the two objects with most votes that are not the view's own.
+  static void add_rivals(const PartsRecognizer::Votes& votes, ShownProbes& shown);
   /// The occluded match, where some of the windows are foreign.
   [[nodiscard]] std::optional<OccludedMatch> match_occluded(const PartsRecognizer::Votes& votes) const;
   /// The views of an object, all of them.
@@ -64,42 +75,47 @@ std::vector<int> Prober::all_views(std::size_t object) const {
   return all;
 }
 
-Probe Prober::known_probe(const View& view) const {
-  Probe probe{view.object, view.object, true};
-  probe.whole = {std::sqrt(yardsticks_.squared[view.object][view.view]),
-                 model_.objects[view.object].typical_distance};
-  return probe;
-}
-
 std::optional<OccludedMatch> Prober::match_occluded(const PartsRecognizer::Votes& votes) const {
   const auto found = identify_if_occluded(model_, votes);
   return found ? std::optional(found->match) : std::nullopt;
 }
 
-void Prober::show_known(const View& view, const cv::Mat& picture, Probe& probe) {
-  const PartsRecognizer::Look look = recognizer_->look(picture);
-  const PartsRecognizer::Votes all = look.vote();
-  const WindowsMatch present = all.match(view.object);
-  const auto own_view = static_cast<int>(view.view);
-  const WindowsMatch left_out = all.without(view.object, {&own_view, 1}).match(view.object);
-  const auto between = [&](double a, double b) { return a + yardsticks_.half_step * (b - a); };
-  WindowsMatch expected = present;
-  expected.votes = between(present.votes, left_out.votes);
-  expected.discriminating = between(present.discriminating, left_out.discriminating);
-  if (present.next && left_out.next) expected.next = between(*present.next, *left_out.next);
-  const RealignedDistance distance = shown_.distance(view.object, std::nullopt);
-  if (distance.other) probe.whole.other = distance.other->distance;
-  probe.windows = {view.object, probe.whole, expected};
+void Prober::show_known(const View& view, ShownProbes& shown) {
+  Probe probe{view.object, view.object, true};
+  probe.whole = known_match(model_, yardsticks_, view.object, view.view);
+  if (view.windows) {
+    const cv::Mat picture = perturbed(view);
+    shown_.show(picture);
+    const PartsRecognizer::Look look = recognizer_->look(picture);
+    const PartsRecognizer::Votes all = look.vote();
+    const WindowsMatch present = all.match(view.object);
+    add_rivals(all, shown);
+    const auto own_view = static_cast<int>(view.view);
+    const WindowsMatch left_out = all.without(view.object, {&own_view, 1}).match(view.object);
+    const auto between = [&](double a, double b) { return a + yardsticks_.half_step * (b - a); };
+    WindowsMatch expected = present;
+    expected.votes = between(present.votes, left_out.votes);
+    expected.discriminating = between(present.discriminating, left_out.discriminating);
+    if (present.next && left_out.next) expected.next = between(*present.next, *left_out.next);
+    const RealignedDistance distance = shown_.distance(view.object, std::nullopt);
+    if (distance.other) {
+      probe.whole.other = distance.other->distance;
+      shown.rivals.push_back(distance.other->manifold);
+    }
+    probe.windows = {view.object, probe.whole, expected};
+  }
+  shown.probes.push_back(probe);
 }
 
-void Prober::show_unknown(const View& view, To to, std::vector<Probe>& probes) {
+void Prober::show_unknown(const View& view, ShownProbes& shown) {
   // Misalignment makes an unknown object less like the learned ones: without it is the harder case.
   const cv::Mat picture = learned(view);
   shown_.show(picture);
   const auto nearest = shown_.nearest(view.object);
   if (!nearest) return;
+  shown.rivals.push_back(*nearest);
   Probe probe{view.object, *nearest, false};
-  if (to == To::whole) {
+  if (!view.windows) {
     probe.whole = whole_match(model_, *nearest, shown_.distance(*nearest, view.object));
   } else {
     const PartsRecognizer::Look look = recognizer_->look(picture);
@@ -107,25 +123,17 @@ void Prober::show_unknown(const View& view, To to, std::vector<Probe>& probes) {
     const WholeCandidate aligned = align_whole(look, shown_.aligned_match(), region, *nearest);
     probe.whole = whole_match(model_, *nearest, aligned.distance);
     const PartsRecognizer::Votes votes = look.vote().without(view.object, all_views(view.object));
+    add_rivals(votes, shown);
     const WholeCandidate best =
         compare_whole(model_, look, votes, shown_.aligned_match(), region, aligned).front();
     probe.windows = {best.object, whole_match(model_, best.object, best.distance), best.windows};
     probe.occluded = match_occluded(votes);
   }
-  probes.push_back(probe);
+  shown.probes.push_back(probe);
 }
 
-void Prober::show(const View& view, To to, std::vector<Probe>& probes) {
-  const cv::Mat as_new = perturbed(view);
-  shown_.show(as_new);
-  Probe known = known_probe(view);
-  if (to == To::windows) show_known(view, as_new, known);
-  probes.push_back(known);
-  show_unknown(view, to, probes);
-}
-
-void Prober::show_hidden(const View& view, std::vector<Probe>& probes) {
-  SeededRandom random(static_cast<std::uint32_t>(view.object * 104729U + view.view + 1U));
+void Prober::show_hidden(const View& view, ShownProbes& shown) {
+  SeededRandom random(~seed_of(name_of(view), view.view));  // not the draws of its perturbation
   const double across = random.unit();
   const double down = random.unit();
   const auto own_view = static_cast<int>(view.view);
@@ -136,43 +144,105 @@ void Prober::show_hidden(const View& view, std::vector<Probe>& probes) {
     hide_square(picture, options_.hidden_share, across, down);
     const PartsRecognizer::Look look = recognizer_->look(picture);
     const std::span<const int> absent = known ? std::span(&own_view, 1) : std::span<const int>(all);
+    const PartsRecognizer::Votes votes = look.vote().without(view.object, absent);
+    add_rivals(votes, shown);
     Probe probe{view.object, view.object, known, true};
-    probe.occluded = match_occluded(look.vote().without(view.object, absent));
-    if (probe.occluded) probes.push_back(probe);
+    probe.occluded = match_occluded(votes);
+    if (probe.occluded) shown.probes.push_back(probe);
   }
+}
+
+void Prober::add_rivals(const PartsRecognizer::Votes& votes, ShownProbes& shown) {
+  std::size_t added = 0;
+  for (const PartialVote& vote : votes.ranked()) {
+    if (vote.object == shown.object) continue;
+    shown.rivals.push_back(vote.object);
+    if (++added == 2) return;
+  }
+}
+
+ShownProbes Prober::show(const View& view) {
+  ShownProbes shown{view.object, view.view, view.windows, view.hidden, {}, {}};
+  show_known(view, shown);
+  show_unknown(view, shown);
+  if (view.hidden) show_hidden(view, shown);
+  std::ranges::sort(shown.rivals);
+  const auto twice = std::ranges::unique(shown.rivals);
+  shown.rivals.erase(twice.begin(), twice.end());
+  return shown;
+}
+
+/// Probes as they were, with the yardsticks as they are.
+ShownProbes brought_up_to_date(const Model& model, const Yardsticks& yardsticks, ShownProbes shown) {
+  for (Probe& probe : shown.probes) {
+    probe.whole.typical = model.objects[probe.taken_for].typical_distance;
+    if (probe.known && !probe.hidden)
+      probe.whole.distance = known_match(model, yardsticks, shown.object, shown.view).distance;
+    if (!probe.windows) continue;
+    const std::size_t taken_for = probe.windows->taken_for;
+    if (probe.known) probe.windows->whole = probe.whole;
+    probe.windows->whole.typical = model.objects[taken_for].typical_distance;
+    probe.windows->windows.typical_votes = model.parts->calibration[taken_for].typical_votes;
+  }
+  return shown;
+}
+
+/// The views to show, and those that were shown before.
+std::vector<View> choose_views(const Model& model, const TrainingViews& views, const ProbeOptions& options) {
+  std::vector<View> chosen;
+  // An even sample: view i is in it where the count of the sample rises.
+  const auto sampled = [&](std::size_t i, std::size_t size) {
+    return i * size / views.count() != (i + 1) * size / views.count() || size >= views.count();
+  };
+  const CalibrationRecord* kept = options.kept;
+  for (std::size_t o = 0; o < views.objects().size(); ++o) {
+    if (kept != nullptr && !kept->objects[o].misalignments.empty()) {
+      for (const ShownProbes& shown : kept->shown)
+        if (shown.object == o)
+          chosen.push_back(
+              {o, shown.view, shown.windows, shown.hidden, shown.probes.empty() ? nullptr : &shown});
+      continue;
+    }
+    for (std::size_t v = 0; v < views.objects()[o].count; ++v) {
+      const std::size_t i = views.objects()[o].first + v;
+      const View view{o, v, model.parts && sampled(i, options.shown),
+                      model.parts && sampled(i, options.hidden), nullptr};
+      // Without windows, every view counts; with them, those that the windows see.
+      if (!model.parts || view.windows || view.hidden || sampled(i, 4 * options.shown))
+        chosen.push_back(view);
+    }
+  }
+  return chosen;
 }
 
 }  // namespace
 
-std::vector<Probe> show_views(const Model& model, const TrainingViews& views, const Yardsticks& yardsticks,
-                              const ProbeOptions& options, const Progress& progress,
-                              const std::stop_token& stop) {
-  std::vector<View> all;
-  for (std::size_t o = 0; o < views.objects().size(); ++o)
-    for (std::size_t v = 0; v < views.objects()[o].count; ++v) all.push_back({o, v});
-  // An even sample: view i is in it where the count of the sample rises.
-  const auto sampled = [&](std::size_t i, std::size_t size) {
-    return i * size / all.size() != (i + 1) * size / all.size() || size >= all.size();
-  };
+std::vector<ShownProbes> show_views(const Model& model, const TrainingViews& views,
+                                    const Yardsticks& yardsticks, const ProbeOptions& options,
+                                    const Progress& progress, const std::stop_token& stop) {
+  const std::vector<View> chosen = choose_views(model, views, options);
   const ModelSearches searches(model);
   constexpr std::size_t batch = 16;
-  std::vector<std::vector<Probe>> probes((all.size() + batch - 1) / batch);
-  WorkMeter meter(progress, stop, "showing views as new and as unknown", all.size());
-  parallel_for(probes.size(), options.threads, [&](std::size_t b) {
-    Prober prober(model, searches, views, yardsticks, options);
-    for (std::size_t i = b * batch; i < std::min(all.size(), (b + 1) * batch); ++i) {
+  std::vector<ShownProbes> result(chosen.size());
+  WorkMeter meter(progress, stop, "showing views as new and as unknown", chosen.size());
+  parallel_for((chosen.size() + batch - 1) / batch, options.threads, [&](std::size_t b) {
+    std::optional<Prober> prober;
+    for (std::size_t i = b * batch; i < std::min(chosen.size(), (b + 1) * batch); ++i) {
       meter.check_stop();
-      const bool windows = model.parts && sampled(i, options.shown);
-      // Without windows, every view counts; with them, those that the windows see.
-      if (!model.parts || windows || sampled(i, 4 * options.shown))
-        prober.show(all[i], windows ? Prober::To::windows : Prober::To::whole, probes[b]);
-      if (model.parts && sampled(i, options.hidden)) prober.show_hidden(all[i], probes[b]);
+      const View& view = chosen[i];
+      if (view.kept == nullptr && !prober) prober.emplace(model, searches, views, yardsticks, options);
+      result[i] =
+          view.kept != nullptr ? brought_up_to_date(model, yardsticks, *view.kept) : prober->show(view);
       meter.finished(1);
     }
   });
-  std::vector<Probe> result;
-  for (const auto& some : probes) result.insert(result.end(), some.begin(), some.end());
   return result;
+}
+
+std::vector<Probe> probes_of(std::span<const ShownProbes> shown) {
+  std::vector<Probe> probes;
+  for (const ShownProbes& view : shown) probes.insert(probes.end(), view.probes.begin(), view.probes.end());
+  return probes;
 }
 
 }  // namespace eigenpose

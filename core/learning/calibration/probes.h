@@ -14,49 +14,37 @@
 /// Of many views, an even sample is shown to the windows: a few hundred probes settle the rates.
 
 #include <cstddef>
-#include <optional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
 #include "core/base/progress.h"
+#include "core/learning/calibration/calibration_record.h"
 #include "core/learning/calibration/yardsticks.h"
 #include "core/learning/training_views.h"
 #include "core/model/model.h"
-#include "core/recognition/decision.h"
 
 namespace eigenpose {
-
-/// One object compared with a region by windows.
-struct WindowsProbe {
-  std::size_t taken_for = 0;
-  WholeMatch whole;
-  WindowsMatch windows;
-};
-
-/// One view, shown once.
-struct Probe {
-  std::size_t object = 0;     ///< whose view it is
-  std::size_t taken_for = 0;  ///< the object whose manifold is nearest: `object` where known
-  bool known = false;
-  bool hidden = false;    ///< a part of it was hidden: only `occluded` counts
-  WholeMatch whole = {};  ///< with `taken_for`
-  std::optional<WindowsProbe> windows =
-      {};  ///< with the most likely object; where it was shown to the windows
-  std::optional<OccludedMatch> occluded = {};  ///< likewise, where some windows are foreign
-};
 
 struct ProbeOptions {
   std::size_t shown = 400;    ///< views shown to the windows, of all objects together
   std::size_t hidden = 150;   ///< of these, views shown with a part hidden
   double hidden_share = 0.2;  ///< of the picture
   unsigned threads = 0;
+  /// What was shown before: see show_views. Empty: nothing.
+  const CalibrationRecord* kept = nullptr;
 };
 
-/// Shows the views: every one as known, and as unknown where there is another object.
+/// Shows the views: every one as known, and as unknown where there is another object. Of objects that have a
+/// record, the views that were shown before are shown again in the same way, or, where their probes were
+/// kept, these are brought up to date with the yardsticks.
 /// @param model with yardsticks; the weights of its decision choose the object that an unknown view is taken
 /// for. @throws Interrupted.
-std::vector<Probe> show_views(const Model& model, const TrainingViews& views, const Yardsticks& yardsticks,
-                              const ProbeOptions& options, const Progress& progress,
-                              const std::stop_token& stop);
+std::vector<ShownProbes> show_views(const Model& model, const TrainingViews& views,
+                                    const Yardsticks& yardsticks, const ProbeOptions& options,
+                                    const Progress& progress, const std::stop_token& stop);
+
+/// The probes of all views, one after the other.
+std::vector<Probe> probes_of(std::span<const ShownProbes> shown);
 
 }  // namespace eigenpose

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/base/parallel.h"
-#include "core/base/random.h"
 #include "core/base/statistics.h"
 #include "core/base/work_meter.h"
 #include "core/learning/calibration/shown_view.h"
@@ -25,9 +24,19 @@ struct ViewDistance {
   MissedErrors missed{};
 };
 
-std::vector<ViewDistance> measure_object(const Model& model, const ModelSearches& searches,
-                                         const TrainingViews& views, const Eigen::MatrixXd& points,
-                                         std::size_t o, const YardstickOptions& options) {
+/// What is measured of all objects, and one of them.
+struct Measured {
+  const Model& model;
+  const ModelSearches& searches;
+  const TrainingViews& views;
+  const Eigen::MatrixXd& points;
+  const YardstickOptions& options;
+};
+
+/// The distances of the views of object o. @param record its misalignments are used, or made where it has
+/// none.
+std::vector<ViewDistance> measure_object(const Measured& all, std::size_t o, ObjectRecord& record) {
+  const auto& [model, searches, views, points, options] = all;
   const ObjectViews& object = views.objects()[o];
   const Eigen::MatrixXd own =
       points.middleCols(static_cast<Eigen::Index>(object.first), static_cast<Eigen::Index>(object.count));
@@ -36,21 +45,18 @@ std::vector<ViewDistance> measure_object(const Model& model, const ModelSearches
   ThinnedManifolds thinned(object, own, model.objects[o].manifold.degree());
   ShownView shown(model, searches);
   std::vector<ViewDistance> result;
+  const bool aligned = record.misalignments.size() == object.count;
   for (std::size_t v = 0; v < object.count; ++v) {
-    shown.show(displaced(views.picture(object.first + v), perturbation_of(options.perturbation, o, v)));
-    const double distance = shown.distance(o, std::nullopt).own;
+    shown.show(displaced(views.picture(object.first + v), options.perturbation.of(object.object, v)));
+    const double distance =
+        (aligned ? shown.distance_at(record.misalignments[v], o) : shown.distance(o, std::nullopt)).own;
+    if (!aligned && model.parts) record.misalignments.push_back(shown.misalignment());
     ViewDistance view{distance * distance};
     view.missed = missed_at(thinned, grid, v, shown.compared_point(), view.full);
     result.push_back(view);
   }
   return result;
 }
-
-/// Votes for one object of its own views, with learned views at least 0, 1 and 2 steps away.
-struct VotesOfViews {
-  std::vector<std::array<double, 3>> votes;
-  double foreign = 0.0;  ///< largest share of foreign windows, one step away, halved
-};
 
 VotesOfViews vote_for_own_views(const PartsModel& model, const TrainingViews& views, std::size_t o,
                                 const YardstickOptions& options, std::size_t stride) {
@@ -66,7 +72,7 @@ VotesOfViews vote_for_own_views(const PartsModel& model, const TrainingViews& vi
   std::vector<float> background;
   VotesOfViews result;
   for (std::size_t v = 0; v < object.count; v += stride) {
-    mapper.compute(displaced(views.picture(object.first + v), perturbation_of(options.residual, o, v)), map);
+    mapper.compute(displaced(views.picture(object.first + v), options.residual.of(object.object, v)), map);
     make_query_windows(map, model.space, model.scale, model.voting, windows);
     matcher.match(windows, shortlist);
     matcher.plain_votes(0, votes);
@@ -95,11 +101,11 @@ VotesOfViews vote_for_own_views(const PartsModel& model, const TrainingViews& vi
 
 /// Share of the way from the votes of a present view to those of one a whole step away which half a step
 /// makes, by the power law through present views, one step and two steps.
-double half_step_share(const std::vector<VotesOfViews>& objects) {
+double half_step_share(const std::vector<ObjectRecord>& objects) {
   std::vector<double> first;
   std::vector<double> second;
-  for (const VotesOfViews& own : objects)
-    for (const auto& [present, one_away, two_away] : own.votes) {
+  for (const ObjectRecord& own : objects)
+    for (const auto& [present, one_away, two_away] : own.votes.votes) {
       first.push_back(present - one_away);
       second.push_back(present - two_away);
     }
@@ -111,29 +117,26 @@ double half_step_share(const std::vector<VotesOfViews>& objects) {
 void measure_windows(const PartsModel& parts, const TrainingViews& views, const YardstickOptions& options,
                      const std::stop_token& stop, Yardsticks& yardsticks) {
   const std::size_t stride = (views.count() + most_scored - 1) / most_scored;
-  std::vector<VotesOfViews> objects(views.objects().size());
+  std::vector<ObjectRecord>& objects = yardsticks.records;
   const Progress silent;
   const WorkMeter meter(silent, stop, "calibrating windows", objects.size());
   parallel_for(objects.size(), options.threads, [&](std::size_t o) {
     meter.check_stop();
-    objects[o] = vote_for_own_views(parts, views, o, options, stride);
+    const std::size_t voting = (views.objects()[o].count + stride - 1) / stride;
+    if (objects[o].votes.votes.size() != voting)
+      objects[o].votes = vote_for_own_views(parts, views, o, options, stride);
   });
   yardsticks.half_step = half_step_share(objects);
-  for (const VotesOfViews& own : objects) {
+  for (const ObjectRecord& own : objects) {
     std::vector<double> expected;
-    for (const auto& votes : own.votes)
+    for (const auto& votes : own.votes.votes)
       expected.push_back(votes[0] + yardsticks.half_step * (votes[1] - votes[0]));
     yardsticks.windows.push_back(
-        {mean(expected), std::clamp(own.foreign, least_foreign_share, most_foreign_share)});
+        {mean(expected), std::clamp(own.votes.foreign, least_foreign_share, most_foreign_share)});
   }
 }
 
 }  // namespace
-
-Misalignment perturbation_of(const Perturbation& perturbation, std::size_t object, std::size_t view) {
-  SeededRandom random(static_cast<std::uint32_t>(object * 7919U + view + 1U));
-  return perturbation.draw(random);
-}
 
 Yardsticks measure_yardsticks(const Model& model, const TrainingViews& views, const Eigen::MatrixXd& points,
                               const YardstickOptions& options, const Progress& progress,
@@ -141,17 +144,19 @@ Yardsticks measure_yardsticks(const Model& model, const TrainingViews& views, co
   const std::size_t count = views.objects().size();
   const ModelSearches searches(model);
   std::vector<std::vector<ViewDistance>> distances(count);
+  Yardsticks result;
+  result.records.assign(options.kept.begin(), options.kept.end());
+  result.records.resize(count);
   WorkMeter meter(progress, stop, "calibrating distances", count);
   parallel_for(count, options.threads, [&](std::size_t o) {
     meter.check_stop();
-    distances[o] = measure_object(model, searches, views, points, o, options);
+    distances[o] = measure_object({model, searches, views, points, options}, o, result.records[o]);
     meter.finished(1);
   });
   std::vector<MissedErrors> missed;
   for (const auto& own : distances)
     for (const ViewDistance& view : own) missed.push_back(view.missed);
   const double growth = error_growth(missed);
-  Yardsticks result;
   result.perturbation = options.perturbation;
   for (const auto& own : distances) {
     std::vector<double> squared;

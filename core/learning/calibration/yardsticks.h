@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/base/progress.h"
+#include "core/learning/calibration/calibration_record.h"
 #include "core/learning/calibration/perturbation.h"
 #include "core/learning/training_views.h"
 #include "core/model/model.h"
@@ -21,6 +22,9 @@ struct YardstickOptions {
   /// The misalignment that alignment leaves, for windows.
   Perturbation residual{.shift = 0.5 / 64.0, .scale = 0.01, .turn_deg = 1.0};
   unsigned threads = 0;
+  /// What a former calibration measured of each object alone: empty records are measured, the others are
+  /// used.
+  std::span<const ObjectRecord> kept = {};
 };
 
 /// What the views of all objects say.
@@ -30,11 +34,9 @@ struct Yardsticks {
   std::vector<std::vector<double>> squared;
   std::vector<double> typical_distance;   ///< one an object: root mean square of new views
   std::vector<PartsCalibration> windows;  ///< one an object; empty without parts
-  double half_step = 0.5;  ///< of a whole step's change of votes, the share that half a step makes
+  double half_step = 0.5;             ///< of a whole step's change of votes, the share that half a step makes
+  std::vector<ObjectRecord> records;  ///< one an object: what another calibration may use
 };
-
-/// The draw of a view's perturbation, the same wherever it is shown.
-Misalignment perturbation_of(const Perturbation& perturbation, std::size_t object, std::size_t view);
 
 /// Measures distances of all views. @param model with manifolds, and parts where it has any.
 /// @param points K × M projections of the views. @throws Interrupted.

@@ -77,5 +77,13 @@ TEST(Displaced, MakesNoRangesThatWereNotMeasured) {
   EXPECT_EQ(cv::countNonZero((moved != 0) & (moved != 1000)), 0);
 }
 
+TEST(Perturbation, OfAViewIsTheSameAgainAndAnotherForEachViewAndObject) {
+  const Perturbation perturbation{.shift = 1.0, .scale = 1.0, .turn_deg = 1.0};
+  EXPECT_EQ(perturbation.of("duck", 3).dx, perturbation.of("duck", 3).dx);
+  EXPECT_NE(perturbation.of("duck", 3).dx, perturbation.of("duck", 4).dx);
+  EXPECT_NE(perturbation.of("duck", 3).dx, perturbation.of("mug", 3).dx);
+  EXPECT_NE(seed_of("ab", 0), seed_of("ba", 0));
+}
+
 }  // namespace
 }  // namespace eigenpose
