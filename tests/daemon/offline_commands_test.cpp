@@ -361,7 +361,7 @@ TEST_F(OfflineCommands, PrintARecognisedObjectWithItsPoseInDegrees) {
   write_objects();
   ASSERT_EQ(eigenpose("learn sets --to a.model --size 32 --whole-region").code, 0);
   EXPECT_THAT(eigenpose("recognize mug.png --model a.model").output,
-              ::testing::ContainsRegex("mug at 1(19|20)\\.[0-9]° ± [0-9.]+ \\(evidence [0-9.]+ of [0-9.]+, "
+              ::testing::ContainsRegex("mug at 1(19|20)\\.[0-9]° ± [0-9.]+ \\(evidence [0-9.]+ of -?[0-9.]+, "
                                        "confidence [01]\\.[0-9][0-9]\\)"));
 }
 
