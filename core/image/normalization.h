@@ -20,8 +20,8 @@ namespace eigenpose {
 struct NormalizationOptions {
   int size = 64;      ///< side of the square appearance, pixels; 8…256
   bool color = true;  ///< pictures of three bands, normalised jointly; false: of one
-  /// What of the picture is compared: an image type or a sum of them (image_type.h). Empty: "color" or "grey",
-  /// as `color` says.
+  /// What of the picture is compared: an image type or a sum of them (image_type.h). Empty: "color" or
+  /// "grey", as `color` says.
   std::string type = {};
   /// Pictures are ready-cut: each is one object, taken whole.
   bool cropped = false;

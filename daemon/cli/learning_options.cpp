@@ -75,8 +75,9 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--size", arguments.options.normalization.size, "Side of a normalised view, pixels")
       ->check(CLI::Range(8, 256))
       ->capture_default_str();
-  auto* color = command.add_flag("--color", arguments.color,
-                                 "Use colour, as brightness and opponent colours (default if the views have it)");
+  auto* color =
+      command.add_flag("--color", arguments.color,
+                       "Use colour, as brightness and opponent colours (default if the views have it)");
   auto* grey = command.add_flag("--grey", arguments.grey, "Use brightness only")->excludes(color);
   command.add_option("--type", arguments.type, type_help())->excludes(color)->excludes(grey);
   command.add_flag("--whole-region", arguments.whole_region,
