@@ -9,8 +9,8 @@ namespace eigenpose {
 namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
-constexpr Eigen::Index windows_rows = 1 + 3 + 4;  // taken_for, whole, windows
-constexpr Eigen::Index occluded_rows = 4 + 4;     // windows, and four more
+constexpr Eigen::Index windows_rows = 1 + 3 + 4;   // taken_for, whole, windows
+constexpr Eigen::Index occluded_rows = 1 + 4 + 4;  // taken_for, windows, and four more
 constexpr Eigen::Index probe_rows =
     1 + 3 + 3 + 1 + windows_rows + 1 + occluded_rows;  // view, what for, whole …
 
@@ -103,11 +103,12 @@ void visit_probe(auto& probe, std::size_t objects, auto& column) {
     column.skip(windows_rows);
   }
   if (column.present(probe.occluded)) {
-    visit_windows(probe.occluded->windows, column);
-    column.number(probe.occluded->occluded);
-    column.number(probe.occluded->merit);
-    column.number(probe.occluded->unexplained);
-    column.number(probe.occluded->foreign_likeness);
+    column.index(probe.occluded->taken_for, objects);
+    visit_windows(probe.occluded->match.windows, column);
+    column.number(probe.occluded->match.occluded);
+    column.number(probe.occluded->match.merit);
+    column.number(probe.occluded->match.unexplained);
+    column.number(probe.occluded->match.foreign_likeness);
   } else {
     column.skip(occluded_rows);
   }

@@ -74,6 +74,7 @@ ViewStoreOptions store_options(const LearningOptions& options) {
 
 /// The options with what depends on the sets, or on other options, decided.
 LearningOptions settled_options(std::span<const TrainingSet> sets, LearningOptions options) {
+  check_rates(options.rates);
   options.normalization.cropped =
       !sets.empty() &&
       std::all_of(sets.begin(), sets.end(), [](const TrainingSet& s) { return s.cropped(); });
@@ -274,8 +275,8 @@ Model learn(std::span<const TrainingSet> sets, LearningOptions options, Learning
   model.parts = parts;
   result.parts_time = watch.lap();
 
-  const CalibrationRecord calibration =
-      calibrate(run, {views, points}, known_calibration(sets, views), parts, model);
+  const CalibrationRecord calibration = calibrate(
+      run, {views, points}, parts ? known_calibration(sets, views) : CalibrationRecord{}, parts, model);
   result.calibration_time = watch.lap();
 
   model.provenance = {options.program_version, created,

@@ -42,10 +42,8 @@ LearningOptions read_options(const Hdf5Group& group) {
   options.spline_degree = static_cast<int>(group.read_integer("spline_degree", 1, 3));
   options.object_spaces = group.read_bool("object_spaces");
   options.parts = group.read_bool("parts");
-  if (group.has_attribute("false_rejection")) {  // else written before there were options for them
-    options.rates.false_rejection = group.read_double("false_rejection");
-    options.rates.false_acceptance = group.read_double("false_acceptance");
-  }
+  options.rates = {group.read_double("false_rejection"), group.read_double("false_acceptance")};
+  check_rates(options.rates);
   options.image_sets = group.read_text("image_sets");
   options.normalization = read_normalization(group.open_group("normalization"));
   return options;
@@ -101,7 +99,7 @@ ObjectViews read_object(const Hdf5Group& group, std::size_t first) {
       throw Hdf5Failure("has objects whose parts do not fit together");
   }
   const Eigen::MatrixXd extents = group.read_doubles("extents");
-  if (extents.rows() != 2 || static_cast<std::size_t>(extents.cols()) != object.count)
+  if (object.count == 0 || extents.rows() != 2 || static_cast<std::size_t>(extents.cols()) != object.count)
     throw Hdf5Failure("has objects whose parts do not fit together");
   if (!(extents.minCoeff() >= 0.0) || !(extents.maxCoeff() <= 1e5))
     throw Hdf5Failure("has views of sizes that cannot be");
@@ -156,15 +154,17 @@ struct TrainingArchive::File {
 
 TrainingArchive::TrainingArchive(std::filesystem::path file) : file_(checked(std::move(file))) {
   with_hdf5(file_, [&] {
-    open_ = std::make_unique<File>(file_);
-    created_ = open_->root.read_text("created");
-    options_ = read_options(open_->root.open_group("options"));
-    const Hdf5Group objects = open_->root.open_group("objects");
+    // Closed in here where something in it is refused: under the lock.
+    auto open = std::make_unique<File>(file_);
+    created_ = open->root.read_text("created");
+    options_ = read_options(open->root.open_group("options"));
+    const Hdf5Group objects = open->root.open_group("objects");
     std::size_t first = 0;
     for (const std::string& name : objects.group_names()) {
       objects_.push_back(read_object(objects.open_group(name), first));
       first += objects_.back().count;
     }
+    open_ = std::move(open);
   });
 }
 

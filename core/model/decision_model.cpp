@@ -7,7 +7,7 @@
 namespace eigenpose {
 
 bool DecisionModel::gives_up_false_rejection() const {
-  return expected.false_rejection > std::max(set.false_rejection, smallest_rate());
+  return held_for_acceptance && expected.false_rejection > std::max(set.false_rejection, smallest_rate());
 }
 
 double DecisionModel::distance_of(double evidence, double typical) const {

@@ -31,8 +31,8 @@ struct DecisionRates {
   friend bool operator==(const DecisionRates&, const DecisionRates&) = default;
 };
 
-/// Constants of recognition that are neither derived nor learned. They are saved with a model, so that it
-/// behaves the same in a later program. How each was measured: core/recognition/README.md, "Constants".
+/// Constants of the decision that are neither derived nor learned. They are saved with a model, so that it
+/// decides the same in a later program. How each was measured: core/recognition/README.md, "Constants".
 struct Tuning {
   /// The whole region settles which object it shows when all others are this much less likely (natural
   /// logarithm).
@@ -80,6 +80,8 @@ struct DecisionModel {
   double required = std::numeric_limits<double>::infinity();
   /// With this much evidence of the whole region alone, windows are not looked at; ≥ required.
   double settled = std::numeric_limits<double>::infinity();
+  /// `required` is what the rate of false acceptances asks for, more than that of false rejections does.
+  bool held_for_acceptance = false;
   DecisionRates set;       ///< by the user
   DecisionRates expected;  ///< what the learned views say that `required` holds
   /// Evidence of learned views shown as new, and of learned objects shown as unknown; rising. They are the
@@ -93,7 +95,8 @@ struct DecisionModel {
   /// The distance at which a whole region alone has this evidence for an object of that typical distance;
   /// infinite where evidence does not fall with distance.
   [[nodiscard]] double distance_of(double evidence, double typical) const;
-  /// Which of the two rates the threshold does not hold: that of false rejections is given up.
+  /// The threshold holds the rate of false acceptances alone, and more known views are expected below it than
+  /// were set, and than the number of views explains.
   [[nodiscard]] bool gives_up_false_rejection() const;
 };
 

@@ -122,6 +122,7 @@ void write_decision(const Hdf5Group& group, const DecisionModel& decision) {
   write_weights(group, "occluded_weights", decision.weights.occluded);
   group.write("required", decision.required);
   group.write("settled", decision.settled);
+  group.write("held_for_acceptance", std::int64_t{decision.held_for_acceptance});
   group.write("set_false_rejection", decision.set.false_rejection);
   group.write("set_false_acceptance", decision.set.false_acceptance);
   group.write("expected_false_rejection", decision.expected.false_rejection);
@@ -139,6 +140,7 @@ DecisionModel read_decision(const Hdf5Group& group) {
   read_weights(group, "occluded_weights", decision.weights.occluded);
   decision.required = group.read_double("required");
   decision.settled = group.read_double("settled");
+  decision.held_for_acceptance = group.read_bool("held_for_acceptance");
   decision.set = {group.read_double("set_false_rejection"), group.read_double("set_false_acceptance")};
   decision.expected = {group.read_double("expected_false_rejection"),
                        group.read_double("expected_false_acceptance")};

@@ -29,8 +29,9 @@ float fast_exp_of_minus(float x) {
     }
     return made;
   }();
+  if (!(x < static_cast<float>(size) / per_unit)) return 0.0F;
   const int i = static_cast<int>(x * per_unit);
-  return i < 0 ? 1.0F : i < size ? table[static_cast<std::size_t>(i)] : 0.0F;
+  return i < 0 ? 1.0F : table[static_cast<std::size_t>(i)];
 }
 
 /// The largest of `count` ≥ 1 scores. Eight at a time, which the compiler makes vectors of.

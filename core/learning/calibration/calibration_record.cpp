@@ -29,6 +29,7 @@ bool move_objects(Places places, ShownProbes& shown) {
     move(probe.object);
     move(probe.taken_for);
     if (probe.windows) move(probe.windows->taken_for);
+    if (probe.occluded) move(probe.occluded->taken_for);
   }
   return all;
 }

@@ -31,6 +31,12 @@ struct WindowsProbe {
   WindowsMatch windows;
 };
 
+/// One object compared with what is visible of a region.
+struct OccludedProbe {
+  std::size_t taken_for = 0;
+  OccludedMatch match;
+};
+
 /// One view, shown once.
 struct Probe {
   std::size_t object = 0;     ///< whose view it is
@@ -40,7 +46,7 @@ struct Probe {
   WholeMatch whole = {};  ///< with `taken_for`
   std::optional<WindowsProbe> windows =
       {};  ///< with the most likely object; where it was shown to the windows
-  std::optional<OccludedMatch> occluded = {};  ///< likewise, where some windows are foreign
+  std::optional<OccludedProbe> occluded = {};  ///< likewise, where it may be occluded (identify_if_occluded)
 };
 
 /// All that a view was shown as.

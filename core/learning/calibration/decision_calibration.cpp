@@ -93,8 +93,9 @@ EvidenceWeights fit_weights(const Probes& probes, double objects) {
   });
   // A known view that is not hidden is no example of an occluded one.
   weights.occluded = fit(probes, prior.occluded, objects, [](const Probe& probe) {
-    return probe.occluded && (probe.hidden || !probe.known) ? std::optional(occluded_terms(*probe.occluded))
-                                                            : std::nullopt;
+    return probe.occluded && (probe.hidden || !probe.known)
+               ? std::optional(occluded_terms(probe.occluded->match))
+               : std::nullopt;
   });
   return weights;
 }
@@ -180,18 +181,24 @@ void leave_out_twins(const DecisionModel& decision, Probes& probes) {
 /// The offset of the evidence for occluded objects with which unknown regions, hidden in part or not, reach
 /// `required` at their share of the rate.
 void set_occlusion(const Probes& probes, std::size_t objects, DecisionModel& decision) {
-  const auto occluded = [&](const Probe& probe) {
-    return probe.occluded ? evidence_of(decision.weights, *probe.occluded) : least_evidence;
-  };
+  const double rate = occluded_share * decision.set.false_acceptance;
   double least = -infinity;
   for (const bool hidden : {false, true}) {
-    const std::vector<double> unknown = sorted_evidence(
-        probes,
-        [hidden](const Probe& p) { return !p.known && p.hidden == hidden && (p.windows || p.hidden); },
-        occluded);
-    least = std::max(
-        least, accepted_at(unknown, occluded_share * decision.set.false_acceptance, objects, few_occluded));
+    std::vector<double> evidence;
+    std::size_t shown = 0;
+    for (const Probe* probe : probes) {
+      if (probe->known || probe->hidden != hidden || !(probe->windows || probe->hidden)) continue;
+      ++shown;
+      if (probe->occluded) evidence.push_back(evidence_of(decision.weights, probe->occluded->match));
+    }
+    std::ranges::sort(evidence);
+    // Regions that are not taken for occluded ones are not accepted as such: the others may be so much
+    // oftener.
+    const double share = shown == 0 ? 1.0 : static_cast<double>(evidence.size()) / static_cast<double>(shown);
+    if (shown == 0 || rate < share)
+      least = std::max(least, accepted_at(evidence, rate / share, objects, few_occluded));
   }
+  if (!std::isfinite(least)) least = accepted_at({}, rate, objects, few_occluded);
   decision.weights.occluded[0] += decision.required - least;
 }
 
@@ -207,13 +214,18 @@ void set_required(const Probes& probes, bool windows, std::size_t objects, Decis
   decision.known = sorted_evidence(probes, shown(true), visible);
   const double left = windows ? 1.0 - occluded_share : 1.0;
   decision.required = accepted_at(unknown, left * decision.set.false_acceptance, objects);
-  if (!decision.known.empty())
-    decision.required = std::max(decision.required, lower_tail(decision.known, decision.set.false_rejection));
+  decision.held_for_acceptance = true;
+  if (!decision.known.empty()) {
+    const double held_for_rejection = lower_tail(decision.known, decision.set.false_rejection);
+    decision.held_for_acceptance = decision.required > held_for_rejection;
+    decision.required = std::max(decision.required, held_for_rejection);
+  }
   if (windows) set_occlusion(probes, objects, decision);
   decision.settled = std::max(decision.settled, decision.required);
   decision.unknown = sorted_evidence(probes, shown(false), [&](const Probe& probe) {
     const double evidence = visible(probe);
-    return probe.occluded ? std::max(evidence, evidence_of(decision.weights, *probe.occluded)) : evidence;
+    return probe.occluded ? std::max(evidence, evidence_of(decision.weights, probe.occluded->match))
+                          : evidence;
   });
   decision.expected = rates_at(decision, decision.required);
 }
@@ -226,19 +238,24 @@ EvidenceWeights prior_weights() {
           {0.0, 2.7, -3.4, 1.9, -2.1, 9.7, 2.6, -7.3, -14.0}};
 }
 
-DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRates& rates,
-                                 std::optional<std::size_t> without) {
+void check_rates(const DecisionRates& rates) {
   if (!(rates.false_rejection >= 0.0 && rates.false_rejection <= 0.5 && rates.false_acceptance >= 0.0 &&
         rates.false_acceptance <= 1.0))
     throw std::invalid_argument("the rate of false rejections is " + std::to_string(rates.false_rejection) +
                                 ", allowed are 0 to 0.5; that of false acceptances is " +
                                 std::to_string(rates.false_acceptance) + ", allowed are 0 to 1");
+}
+
+DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRates& rates,
+                                 std::optional<std::size_t> without) {
+  check_rates(rates);
   Probes used;
   std::set<std::size_t> objects;
   bool windows = false;
   for (const Probe& probe : probes) {
     const bool of_it = probe.object == without || probe.taken_for == without ||
-                       (probe.windows && probe.windows->taken_for == without);
+                       (probe.windows && probe.windows->taken_for == without) ||
+                       (probe.occluded && probe.occluded->taken_for == without);
     if (of_it) continue;
     used.push_back(&probe);
     objects.insert(probe.object);

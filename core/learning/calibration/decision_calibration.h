@@ -2,15 +2,15 @@
 
 /// From probes to the decision: weights, thresholds, and the rates that they hold.
 ///
-/// **Weights.** Logistic regression of known against unknown probes, with a prior that was measured on other
-/// objects: a model of one or two objects has the prior, one of many its own weights.
+/// **Weights.** Logistic regression of known against unknown probes, with a prior (`prior_weights`): a model
+/// of one or two objects has the prior, one of many its own weights.
 ///
 /// **Threshold.** The evidence of known probes below which the set share of false rejections lies; the
 /// evidence of unknown probes above which that of false acceptances does. Both are told by the sample, and
 /// beyond its lowest (highest) twentieth by an exponential tail, as a few hundred probes do not show one in a
 /// thousand. Where both rates can be held, the threshold is the one of false rejections. Where not, that of
 /// false acceptances wins: a wrong name is worse than none. A log-odds bounds the rate of false acceptances
-/// by itself, P(Λ > t | unknown) ≤ e^−t; half of that t decides where there are few unknown probes.
+/// by itself, P(Λ > t | unknown) ≤ e^−t; a share of that t decides where there are few objects.
 
 #include <optional>
 #include <span>
@@ -23,9 +23,12 @@ namespace eigenpose {
 /// The weights before any view was seen. Measured: core/recognition/README.md, "Constants".
 EvidenceWeights prior_weights();
 
+/// @throws std::invalid_argument for rates out of range: 0…0.5 of false rejections, 0…1 of false acceptances.
+void check_rates(const DecisionRates& rates);
+
 /// The decision that the probes support.
 /// @param without an object whose probes are not used, as if it had not been learned.
-/// @throws std::invalid_argument for rates out of range: 0…0.5 of false rejections, 0…1 of false acceptances.
+/// @throws as check_rates.
 DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRates& rates,
                                  std::optional<std::size_t> without = std::nullopt);
 

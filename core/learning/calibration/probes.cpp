@@ -57,7 +57,7 @@ class Prober {
   /// Notes the two objects with most votes that are not the view's own.
   static void add_rivals(const PartsRecognizer::Votes& votes, ShownProbes& shown);
   /// The occluded match, where some of the windows are foreign.
-  [[nodiscard]] std::optional<OccludedMatch> match_occluded(const PartsRecognizer::Votes& votes) const;
+  [[nodiscard]] std::optional<OccludedProbe> match_occluded(const PartsRecognizer::Votes& votes) const;
   /// The views of an object, all of them.
   [[nodiscard]] std::vector<int> all_views(std::size_t object) const;
 
@@ -75,9 +75,9 @@ std::vector<int> Prober::all_views(std::size_t object) const {
   return all;
 }
 
-std::optional<OccludedMatch> Prober::match_occluded(const PartsRecognizer::Votes& votes) const {
+std::optional<OccludedProbe> Prober::match_occluded(const PartsRecognizer::Votes& votes) const {
   const auto found = identify_if_occluded(model_, votes);
-  return found ? std::optional(found->match) : std::nullopt;
+  return found ? std::optional(OccludedProbe{found->best.object, found->match}) : std::nullopt;
 }
 
 void Prober::show_known(const View& view, ShownProbes& shown) {
@@ -148,7 +148,7 @@ void Prober::show_hidden(const View& view, ShownProbes& shown) {
     add_rivals(votes, shown);
     Probe probe{view.object, view.object, known, true};
     probe.occluded = match_occluded(votes);
-    if (probe.occluded) shown.probes.push_back(probe);
+    shown.probes.push_back(probe);
   }
 }
 
@@ -178,6 +178,9 @@ ShownProbes brought_up_to_date(const Model& model, const Yardsticks& yardsticks,
     probe.whole.typical = model.objects[probe.taken_for].typical_distance;
     if (probe.known && !probe.hidden)
       probe.whole.distance = known_match(model, yardsticks, shown.object, shown.view).distance;
+    if (probe.occluded)
+      probe.occluded->match.windows.typical_votes =
+          model.parts->calibration[probe.occluded->taken_for].typical_votes;
     if (!probe.windows) continue;
     const std::size_t taken_for = probe.windows->taken_for;
     if (probe.known) probe.windows->whole = probe.whole;

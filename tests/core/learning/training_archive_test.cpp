@@ -468,7 +468,7 @@ TEST_F(UpdatedCalibrationTest, TheFileKeepsAllThatCalibrationFound) {
     }
     ASSERT_EQ(a.occluded.has_value(), b.occluded.has_value());
     if (a.occluded) {
-      EXPECT_EQ(occluded_terms(*a.occluded), occluded_terms(*b.occluded));
+      EXPECT_EQ(occluded_terms(a.occluded->match), occluded_terms(b.occluded->match));
     }
   }
 }

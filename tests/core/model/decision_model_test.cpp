@@ -33,6 +33,7 @@ TEST(DecisionModel, BothRatesFollowTheThreshold) {
 TEST(DecisionModel, GivesUpFalseRejectionWhereMoreAreExpectedThanWereSetAndThanTheViewsExplain) {
   DecisionModel decision;
   decision.known = {1.0, 2.0, 3.0, 4.0};
+  decision.held_for_acceptance = true;
   EXPECT_DOUBLE_EQ(decision.smallest_rate(), 0.2);
   struct Case {
     double set;
@@ -48,6 +49,8 @@ TEST(DecisionModel, GivesUpFalseRejectionWhereMoreAreExpectedThanWereSetAndThanT
     decision.expected.false_rejection = one.expected;
     EXPECT_EQ(decision.gives_up_false_rejection(), one.gives_up) << one.set << ", " << one.expected;
   }
+  decision.held_for_acceptance = false;
+  EXPECT_FALSE(decision.gives_up_false_rejection()) << "the views alone fall short";
 }
 
 }  // namespace

@@ -59,6 +59,7 @@ TEST_F(ModelFile, GivesBackEverythingBitForBit) {
   EXPECT_EQ(after.decision.weights, before.decision.weights);
   EXPECT_EQ(after.decision.required, before.decision.required);
   EXPECT_EQ(after.decision.settled, before.decision.settled);
+  EXPECT_EQ(after.decision.held_for_acceptance, before.decision.held_for_acceptance);
   EXPECT_EQ(after.decision.set, before.decision.set);
   EXPECT_EQ(after.decision.expected, before.decision.expected);
   EXPECT_EQ(after.decision.known, before.decision.known);

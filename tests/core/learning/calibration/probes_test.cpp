@@ -23,11 +23,15 @@ TEST(Probes, ShowEveryViewAsKnownAndAsUnknown) {
   EXPECT_EQ(count(true, false), views);
   EXPECT_EQ(count(false, false), views);
   EXPECT_GT(count(true, true), 0U);
+  EXPECT_EQ(count(false, true), count(true, true));
+  EXPECT_GT(std::ranges::count_if(
+                probes, [](const Probe& probe) { return probe.known && probe.hidden && probe.occluded; }),
+            0);
   for (const Probe& probe : probes) {
-    if (probe.hidden) {
-      EXPECT_TRUE(probe.occluded);
-      continue;
+    if (probe.occluded) {
+      EXPECT_EQ(probe.known, probe.occluded->taken_for == probe.object);
     }
+    if (probe.hidden) continue;
     ASSERT_TRUE(probe.windows) << "few views: all are shown to the windows";
     EXPECT_EQ(probe.known, probe.taken_for == probe.object);
     EXPECT_EQ(probe.known, probe.windows->taken_for == probe.object);
@@ -94,7 +98,7 @@ TEST(Probes, DoNotDependOnThreads) {
     EXPECT_EQ(a.whole.distance, b.whole.distance);
     ASSERT_EQ(a.occluded.has_value(), b.occluded.has_value());
     if (a.occluded) {
-      EXPECT_EQ(occluded_terms(*a.occluded), occluded_terms(*b.occluded));
+      EXPECT_EQ(occluded_terms(a.occluded->match), occluded_terms(b.occluded->match));
     }
     if (a.windows) {
       EXPECT_EQ(windows_terms(a.windows->whole, a.windows->windows),
