@@ -187,8 +187,8 @@ void check_possible(std::span<const ImageSet> sets, const EvaluationOptions& opt
     throw std::invalid_argument("leaving one object out needs at least two objects, there is one");
   if (options.scenes.count > 0 && std::ranges::all_of(sets, &ImageSet::cropped))
     throw std::invalid_argument(
-        "scenes are composed of objects cut out of their views, and all views here are cropped; import them "
-        "with --views scene");
+        "scenes are composed of objects that are cut out of their views, and all views here are cropped: "
+        "import them as scenes");
 }
 
 }  // namespace

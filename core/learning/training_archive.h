@@ -17,7 +17,7 @@
 /// With the products and the record of the calibration, an update measures what concerns the objects that
 /// join, and what they change.
 ///
-/// For 3600 colour views of 64 × 64: 44 MB of pictures and 104 MB of products.
+/// For 3600 grey views of 64 × 64: 15 MB of pictures and 104 MB of products.
 
 #include <filesystem>
 #include <memory>

@@ -1,9 +1,11 @@
 /// `eigenpose evaluate`: how well objects are distinguished, measured on views that were not learned.
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,20 +62,25 @@ struct EvaluateOptions {
 TestDamage parse_damage(const EvaluateOptions& options) {
   TestDamage damage;
   damage.seed = options.seed;
+  if (!std::isfinite(options.occlude)) throw ConfigError("--occlude: give a share of 0 to 0.9");
   damage.occlusion = options.occlude;
+  std::set<std::string> given;
   for (const std::string& item : options.perturb) {
     const auto equals = item.find('=');
     const std::string name = item.substr(0, equals);
+    const char* number = equals == std::string::npos ? "" : item.c_str() + equals + 1;
     char* end = nullptr;
-    const double value = equals == std::string::npos ? -1.0 : std::strtod(item.c_str() + equals + 1, &end);
+    const double value = std::strtod(number, &end);
     double* field = name == "shift"      ? &damage.shift
                     : name == "scale"    ? &damage.scale
                     : name == "rotation" ? &damage.rotation_deg
                                          : nullptr;
-    if (field == nullptr || end == nullptr || *end != '\0' || !(value >= 0.0) ||
-        (name == "scale" && value >= 1.0))
-      throw ConfigError("--perturb: \"" + item +
-                        "\" is not one of shift=PIXELS, scale=SHARE, rotation=DEGREES");
+    const double most = name == "shift" ? 64.0 : name == "scale" ? 0.9 : 180.0;
+    if (field == nullptr || end == number || *end != '\0' || !(value >= 0.0 && value <= most))
+      throw ConfigError(
+          "--perturb: \"" + item +
+          "\" is not one of shift=PIXELS (to 64), scale=SHARE (to 0.9), rotation=DEGREES (to 180)");
+    if (!given.insert(name).second) throw ConfigError("--perturb: " + name + " is given twice");
     *field = value;
   }
   return damage;

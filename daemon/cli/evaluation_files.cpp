@@ -52,8 +52,12 @@ void check_evaluation_files(const EvaluationFiles& files, bool leave_one_out) {
                                {"--confusion", files.confusion, {".svg"}}}) {
     if (given.file.empty()) continue;
     check_ending(given);
-    const auto [other, is_new] =
-        named.emplace(std::filesystem::absolute(given.file).lexically_normal(), given.option);
+    // Links followed, of the file and of its folder: two names of one file would overwrite each other.
+    const AtomicFile writable(given.file);
+    const std::filesystem::path target = std::filesystem::absolute(writable.target());
+    const std::filesystem::path resolved =
+        std::filesystem::canonical(target.parent_path()) / target.filename();
+    const auto [other, is_new] = named.emplace(resolved, given.option);
     if (!is_new)
       throw ConfigError(std::string(given.option)
                             .append(": \"")
@@ -61,7 +65,6 @@ void check_evaluation_files(const EvaluationFiles& files, bool leave_one_out) {
                             .append("\" is the file of ")
                             .append(other->second)
                             .append(" too; give each its own"));
-    const AtomicFile writable(given.file);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/base/printable.h"
 #include "core/model/model_file.h"
 #include "daemon/cli/commands.h"
 #include "daemon/cli/geometry_report.h"
@@ -121,8 +122,9 @@ void print_curve(const DecisionModel& decision) {
 }
 
 void print(const Model& model) {
-  std::printf("learned   %s by eigenpose %s from %s\n", model.provenance.created.c_str(),
-              model.provenance.program_version.c_str(), model.provenance.image_sets.c_str());
+  std::printf("learned   %s by eigenpose %s from %s\n", printable(model.provenance.created).c_str(),
+              printable(model.provenance.program_version).c_str(),
+              printable(model.provenance.image_sets).c_str());
   std::printf("views     %dx%d %s, %s\n", model.normalization.size, model.normalization.size,
               image_type_name(model.normalization).c_str(),
               model.normalization.cropped ? "each picture taken whole" : "objects cut out of each picture");
@@ -138,8 +140,8 @@ void print(const Model& model) {
                 static_cast<double>(model.memory(o)) / 1e6);
     for (std::size_t d = 0; d < object.workspace.size(); ++d) {
       const Dof& dof = object.workspace[d];
-      std::printf("%s%s: %zu values in %g…%g %s%s%s", d > 0 ? "; " : "", dof.name.c_str(),
-                  object.manifold.axes()[d].samples.size(), dof.lower, dof.upper, dof.unit.c_str(),
+      std::printf("%s%s: %zu values in %g…%g %s%s%s", d > 0 ? "; " : "", printable(dof.name).c_str(),
+                  object.manifold.axes()[d].samples.size(), dof.lower, dof.upper, printable(dof.unit).c_str(),
                   dof.periodic ? ", periodic" : "", object.dof_observable[d] ? "" : ", not observable");
     }
     std::printf("\n");
@@ -155,7 +157,7 @@ int run_inspect(const InspectOptions& options) {
     if (options.geometry)
       for (std::size_t o = 0; o < model.objects.size(); ++o)
         all["objects"][o]["geometry"] = geometry_json(model.objects[o]);
-    std::printf("%s\n", all.dump(2).c_str());
+    std::printf("%s\n", all.dump(2, ' ', false, json::error_handler_t::replace).c_str());
   } else {
     print(model);
     print_resemblance(model);

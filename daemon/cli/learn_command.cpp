@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -14,6 +15,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/atomic_file.h"
+#include "core/base/error.h"
+#include "core/base/file_lock.h"
 #include "core/base/printable.h"
 #include "core/learning/learning.h"
 #include "core/learning/training_archive.h"
@@ -126,6 +129,19 @@ std::filesystem::path views_file(const std::string& model) {
   return model + ".views";
 }
 
+/// Adds a folder to those that a model was learned from, unless it is among them. Of very many the first are
+/// named.
+void add_folder(std::string& folders, const std::string& folder) {
+  constexpr std::size_t most = 16384;
+  constexpr std::string_view between = ", ";
+  for (std::size_t begin = 0; begin <= folders.size();) {
+    const std::size_t end = std::min(folders.find(between, begin), folders.size());
+    if (folders.compare(begin, end - begin, folder) == 0) return;
+    begin = end + between.size();
+  }
+  if (folders.size() + folder.size() < most) folders.append(between).append(folder);
+}
+
 /// What a model is learned from, and how.
 struct Lesson {
   std::vector<ImageSet> images;
@@ -160,8 +176,7 @@ Lesson next_lesson(const LearnOptions& options) {
   lesson.options.former = lesson.former.get();
   if (!options.sets.empty()) {
     lesson.images = open_learned_sets(options.sets, options.learning, lesson.left_out);
-    const std::string folder = absolute_folder(options.sets);
-    if (!folder.starts_with(lesson.options.image_sets)) lesson.options.image_sets += ", " + folder;
+    add_folder(lesson.options.image_sets, absolute_folder(options.sets));
   }
   lesson.sets = updated_sets(*lesson.kept, options.remove, lesson.images);
   if (lesson.sets.empty()) throw ConfigError("--remove: no object would be left");
@@ -170,6 +185,15 @@ Lesson next_lesson(const LearnOptions& options) {
   lesson.options.memory_limit = memory_limit(options.learning);
   lesson.options.kept_views = views_file(options.to);
   return lesson;
+}
+
+/// An update whose sets cannot be used would only take objects away. @throws ConfigError naming the first set
+/// that did not join.
+void check_joined(const Lesson& lesson, const Model& model) {
+  for (const ImageSet& set : lesson.images)
+    if (std::ranges::find(model.objects, set.object(), &ModelObject::name) == model.objects.end())
+      throw ConfigError("\"" + set.object() +
+                        "\" cannot join: its views cannot be used; nothing was changed");
 }
 
 /// The service takes no other options than these. @throws UsageError naming the first that it does not take.
@@ -198,7 +222,11 @@ int run_learn(LearnOptions options, const CLI::App& command, const std::stop_tok
         "--objects: it chooses from image sets, and none are given; --remove names objects that leave");
   if (options.to.empty()) options.to = options.update;
   if (options.to.empty()) throw UsageError("the model needs a name; add --to FILE");
+  if (std::filesystem::path(options.to).extension() == ".views")
+    throw ConfigError("--to: " + options.to +
+                      " is a name of kept views; give the model another, as lab.model");
   { const AtomicFile writable(options.to); }  // said now, not when all is learned
+  const FileLock alone(options.to + ".lock", "the model");
   Lesson lesson = update ? next_lesson(options) : new_lesson(options);
   const auto folder = std::filesystem::path(options.to).parent_path();
   if (options.learning.strict) lesson.options.bad_views = BadViews::refuse;
@@ -206,11 +234,17 @@ int run_learn(LearnOptions options, const CLI::App& command, const std::stop_tok
   ConsoleProgress progress;
   LearningReport report;
   const Model model = learn(lesson.sets, lesson.options, &report, progress.callback(), stop);
-  save_model(model, options.to);
-  if (report.kept_views) report.kept_views->commit();
   progress.clear();
   print_left_out(lesson.left_out);
   print_left_out(report.left_out);
+  if (update) check_joined(lesson, model);
+  save_model(model, options.to);
+  if (report.kept_views) try {
+      report.kept_views->commit();
+    } catch (const FileError& error) {
+      throw FileError(options.to, std::string("is learned and replaced, but its views could not be kept: ") +
+                                      error.what() + "; to update it again, learn it with --keep-views");
+    }
   print(model, report, options.to);
   return exit_done;
 }

@@ -36,6 +36,27 @@ TEST_F(OfflineCommands, EvaluateShowsScenesOfSeveralObjects) {
   EXPECT_THAT(unsaid.output, HasSubstr("--scenes 200"));
 }
 
+TEST_F(OfflineCommands, EvaluateRefusesDamageThatIsNone) {
+  write_objects();
+  for (const std::string wrong :
+       {"--occlude nan", "--perturb shift=", "--perturb shift=inf", "--perturb rotation=1e300",
+        "--perturb scale=0.95", "--perturb shift=2,shift=3", "--perturb shift=nan", "--perturb shift"}) {
+    const Ended run = eigenpose("evaluate sets --learn-every 2 --size 32 --whole-region " + wrong);
+    EXPECT_EQ(run.code, 1) << wrong << run.output;
+    EXPECT_THAT(run.output, HasSubstr(wrong.substr(0, wrong.find(' ')))) << wrong;
+  }
+}
+
+TEST_F(OfflineCommands, EvaluateWritesNoTwoResultsToOneFileThroughALink) {
+  write_objects();
+  std::filesystem::create_symlink("real.csv", path("link.csv"));
+  const Ended run = eigenpose(
+      "evaluate sets --learn-every 2 --size 32 --whole-region --csv real.csv --calibration link.csv");
+  EXPECT_EQ(run.code, 1);
+  EXPECT_THAT(run.output, HasSubstr("is the file of --calibration too"));
+  EXPECT_FALSE(std::filesystem::exists(path("real.csv")));
+}
+
 TEST_F(OfflineCommands, EvaluateFollowsItsSeedInEverythingThatIsDrawnAtRandom) {
   write_objects();
   for (const std::string drawn : {"--scenes 10", "--perturb rotation=8,shift=3", "--occlude 0.1"}) {

@@ -56,7 +56,7 @@ ThinnedManifolds::Thinned ThinnedManifolds::thin(std::size_t d, std::size_t ever
   axes[d].samples.clear();
   for (std::size_t i = 0; i < all.size(); ++i)
     if (kept(i)) axes[d].samples.push_back(all[i]);
-  if (axes[d].samples.size() < 2) return {};
+  if (axes[d].samples.size() < (closed ? 3U : 2U)) return {};  // they would make no manifold
   const Grid grid = grid_of(object_.axes);
   std::vector<Eigen::Index> cells;
   for (std::size_t cell = 0; cell < object_.count; ++cell)

@@ -153,7 +153,7 @@ TEST(Evaluation, RefusesWhatTheSetsCannotShowBeforeItLearns) {
   };
   EvaluationOptions options = small_evaluation();
   options.scenes.count = 1;
-  EXPECT_THAT(refusal(options), HasSubstr("--views scene"));
+  EXPECT_THAT(refusal(options), HasSubstr("cropped"));
   options.scenes.count = 0;
   options.leave_one_out = true;
   EXPECT_THAT(refusal(options), HasSubstr("two objects"));

@@ -162,7 +162,8 @@ TEST_F(TrainingArchiveTest, ViewsBeyondTheMemoryLimitComeAndGoToo) {
   testing::write_turn(sets(), "one", 1, 36);
   write("two", 2);
   LearningOptions options = testing::small_learning();
-  options.normalization.color = false;  // inner products of bytes: the same in whichever order they are added
+  // In colour, known products leave the solver less memory: its tiles are others, and round otherwise.
+  options.normalization.color = false;
   options.solver.solver = "gram";
   options.solver.components = 2;
   keep("kept", options);
