@@ -184,10 +184,15 @@ void AtomicFile::sync() {
 }
 
 void AtomicFile::replace() {
+  // The lock stays until the part has its name: others would take it for an abandoned one.
+  const int locked = ::fcntl(fd_, F_DUPFD_CLOEXEC, 0);
   // Network file systems and quotas report here what they could not write. The descriptor is gone either way.
-  if (calls_.close(std::exchange(fd_, -1)) != 0 && errno != EINTR) fail("cannot be written", errno);
-  if (calls_.rename(part_.c_str(), target_.c_str()) != 0) fail("cannot be replaced", errno);
-  renamed_ = true;
+  const bool closed = calls_.close(std::exchange(fd_, -1)) == 0 || errno == EINTR;
+  renamed_ = closed && calls_.rename(part_.c_str(), target_.c_str()) == 0;
+  const int error = errno;
+  if (locked >= 0) ::close(locked);
+  if (!closed) fail("cannot be written", error);
+  if (!renamed_) fail("cannot be replaced", error);
 }
 
 void AtomicFile::commit_unflushed() {

@@ -310,6 +310,18 @@ TEST_F(AtomicFileTest, ANameThatAKilledProgramLeftIsNoObstacle) {
   EXPECT_EQ(read(next), "left");
 }
 
+TEST_F(AtomicFileTest, AFinishedPartIsNoAbandonedOneBeforeItHasItsName) {
+  class Meanwhile : public FileCalls {
+   public:
+    int rename(const char* from, const char* to) override {
+      remove_abandoned_parts(fs::path(from).parent_path());
+      return FileCalls::rename(from, to);
+    }
+  } calls;
+  write_file_atomically(file_, "new", calls);
+  EXPECT_EQ(read(file_), "new");
+}
+
 TEST_F(AtomicFileTest, PartsOfKilledProgramsAreRemovedAndThoseOfRunningOnesKept) {
   AtomicFile running(file_);
   running.write("new");
