@@ -308,7 +308,7 @@ void draw_matrix_labels(SvgDrawing& drawing, const MatrixLayout& layout, std::sp
   drawing.text("muted middle", {30.0, layout.top + 0.5 * layout.height()}, "shown", -90.0);
 }
 
-/// One cell, if any view fell into it. @param views of its row.
+/// One cell, if any view fell into it. @param share of the views of its row.
 void draw_cell(SvgDrawing& drawing, const SvgBox& box, std::string_view style, double share,
                std::string_view tooltip) {
   const double opacity = 0.25 + 0.75 * std::sqrt(share);

@@ -32,7 +32,7 @@ struct PartsLearningOptions {
   unsigned threads = 0;
 };
 
-/// Learns windows and alignment eigenspaces. Thresholds come from calibrate_parts.
+/// Learns windows and alignment eigenspaces. What is calibrated comes later (calibration/).
 /// @throws std::invalid_argument without objects or views; Interrupted.
 PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
                        const Progress& progress = {}, std::stop_token stop = {});

@@ -7,10 +7,10 @@
 ///
 ///     /                attribute created: of the model that was learned with it
 ///     /options         attributes solver, components, energy, …; normalization: as in a model
-///     /objects/0000…   attributes name, cropped; pictures (bytes, view after view); energies (n); extents
-///     (n×2);
-///                      left_out_errors (n) of the alignment eigenspace; axes/0… as in a model; poses (n×m)
-///                      where the views are no grid
+///     /objects/0000…   attributes name, cropped; pictures (bytes, view after view);
+///                      energies (n); extents (n×2); left_out_errors (n) of the alignment
+///                      eigenspace; axes/0… as in a model; poses (n×m) where the views
+///                      are no grid
 ///     /calibration     what calibration measured (calibration_file.h); only of models with parts
 ///     /products        inner products of all views, M × M; only where the gram solver made them
 ///

@@ -173,8 +173,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
   }
   parts.scale = {static_cast<float>(group.read_double("learned_step")),
                  static_cast<float>(group.read_double("query_step"))};
-  // Files of before these options were kept have what was the default then.
-  if (group.has("voting")) parts.voting = read_voting(group.open_group("voting"));
+  parts.voting = read_voting(group.open_group("voting"));
   parts.noise = group.read_double("noise");
   for (std::size_t o = 0; o < names.size(); ++o) {
     const Hdf5Group object = stored.open_group(names[o]);

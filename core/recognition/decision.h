@@ -10,8 +10,8 @@
 /// with the terms φ of one of three hypotheses, below. The distance d of a known view grows with its object's
 /// own interpolation error s, that of an unknown one does not: with both logarithms normal, their likelihood
 /// ratio is linear in ln d and ln s. Weights are learned from the model's own views (core/learning/
-/// calibration). A region gets the name of the object with the most evidence, if that is at least
-/// DecisionModel::required.
+/// calibration). A region gets the name of the object that its windows or its distances choose
+/// (parts_stage.h, recognizer.h), if the evidence for it is at least DecisionModel::required.
 ///
 /// **Confidence** is the posterior that the best object b is right, beside the second best r and an unknown
 /// object: e^Λ(b) / (e^Λ(b) + e^Λ(r) + 1).

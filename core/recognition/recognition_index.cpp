@@ -32,11 +32,15 @@ RecognitionIndex::RecognitionIndex(std::shared_ptr<const Model> model, const Rec
     : model_(with_objects(std::move(model))),
       searches_(*model_, options.search),
       reach_(reach_of(*model_)),
-      object_eigenspaces_(*model_),
-      samples_(searches_.manifolds.begin(), searches_.manifolds.end()) {
+      object_eigenspaces_(*model_) {
   if (options.rejector && reach_ > 0.0 && std::isfinite(reach_))
     rejector_ = std::make_unique<RejectionSearch>(searches_.manifolds, RejectorOptions{.distance = reach_});
-  if (model_->parts) extents_ = ViewExtents(*model_->parts);
+  if (model_->parts) {
+    extents_ = ViewExtents(*model_->parts);
+    return;
+  }
+  samples_.reserve(searches_.manifolds.size());
+  for (const Manifold& manifold : searches_.manifolds) samples_.emplace_back(manifold);
 }
 
 }  // namespace eigenpose

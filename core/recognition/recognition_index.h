@@ -36,7 +36,7 @@ class RecognitionIndex {
   /// No farther manifold can be accepted, nor be the runner-up of an accepted one.
   [[nodiscard]] double reach() const { return reach_; }
   [[nodiscard]] const ObjectEigenspaceIndex& object_eigenspaces() const { return object_eigenspaces_; }
-  /// Of the manifold of object `o`.
+  /// Of the manifold of object `o`. @pre the model has no parts: only then are they made.
   [[nodiscard]] const ManifoldSamples& samples(std::size_t o) const { return samples_[o]; }
   [[nodiscard]] const ViewExtents& extents() const { return extents_; }
 

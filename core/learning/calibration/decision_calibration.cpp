@@ -108,9 +108,9 @@ double visible_evidence(const DecisionModel& decision, const Probe& probe) {
   return whole >= decision.settled ? std::max(whole, windows) : windows;
 }
 
-/// The number that a share `rate` of all numbers falls below, told by a sample in rising order: within the
-/// sample the k-th smallest with k = rate·(n + 1); below its lowest twentieth by an exponential tail, whose
-/// mean is that of what lies below the twentieth (peaks over threshold: Pickands 1975).
+/// The number that a share `rate` of all numbers falls below, estimated from a sample in rising order: within
+/// the sample the k-th smallest with k = rate·(n + 1); below its lowest twentieth by an exponential tail,
+/// whose mean is that of what lies below the twentieth (peaks over threshold: Pickands 1975).
 double lower_tail(const std::vector<double>& rising, double rate) {
   const auto n = static_cast<double>(rising.size());
   const auto tail = std::min(std::max<std::size_t>(rising.size() / 20, least_tail), rising.size());

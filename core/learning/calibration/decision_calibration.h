@@ -6,11 +6,11 @@
 /// of one or two objects has the prior, one of many its own weights.
 ///
 /// **Threshold.** The evidence of known probes below which the set share of false rejections lies; the
-/// evidence of unknown probes above which that of false acceptances does. Both are told by the sample, and
-/// beyond its lowest (highest) twentieth by an exponential tail, as a few hundred probes do not show one in a
-/// thousand. Where both rates can be held, the threshold is the one of false rejections. Where not, that of
-/// false acceptances wins: a wrong name is worse than none. A log-odds bounds the rate of false acceptances
-/// by itself, P(Λ > t | unknown) ≤ e^−t; a share of that t decides where there are few objects.
+/// evidence of unknown probes above which that of false acceptances does. Both are quantiles of the sample,
+/// and beyond its lowest (highest) twentieth of an exponential tail, as a few hundred probes do not show one
+/// in a thousand. Where both rates can be held, the threshold is the one of false rejections. Where not, that
+/// of false acceptances wins: a wrong name is worse than none. A log-odds bounds the rate of false
+/// acceptances by itself, P(Λ > t | unknown) ≤ e^−t; a share of that t decides where there are few objects.
 
 #include <optional>
 #include <span>

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double least_foreign_share = 0.05;
 constexpr double most_foreign_share = 0.3;
-constexpr std::size_t most_scored = 3000;  // views of all objects: more are told by a part of them
+constexpr std::size_t most_scored = 3000;  // views of all objects: of more, a part is measured
 
 /// One view compared with its own object.
 struct ViewDistance {

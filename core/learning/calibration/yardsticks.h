@@ -1,6 +1,6 @@
 #pragma once
 
-/// How well new views of each object will match it, told by the learned ones: see probes.h.
+/// How well new views of each object will match it, as measured on the learned ones: see probes.h.
 
 #include <cstddef>
 #include <span>
