@@ -54,7 +54,7 @@ foreach(command IN LISTS commands)
   endif()
 endforeach()
 
-must_run("configuring the outside program" ${CMAKE_COMMAND} -S ${SOURCE}/tests/install/outside -B ${work}/outside
+must_run("configuring the outside program" ${CMAKE_COMMAND} -G Ninja -S ${SOURCE}/tests/install/outside -B ${work}/outside
          -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER})
 must_run("building the outside program" ${CMAKE_COMMAND} --build ${work}/outside)
 file(MAKE_DIRECTORY ${work}/sets)
