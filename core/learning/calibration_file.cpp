@@ -17,7 +17,7 @@ constexpr Eigen::Index probe_rows =
 /// Numbers of one probe on their way into a column.
 class ColumnWriter {
  public:
-  explicit ColumnWriter(Eigen::Ref<Eigen::VectorXd> column) : column_(column) {}
+  explicit ColumnWriter(const Eigen::Ref<Eigen::VectorXd>& column) : column_(column) {}
   void number(double value) { column_(row_++) = value; }
   void index(std::size_t value, std::size_t /*below*/) { number(static_cast<double>(value)); }
   void optional(const std::optional<double>& value) { number(value.value_or(no_value)); }

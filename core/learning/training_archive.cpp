@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/dataset/natural_order.h"
+#include "core/learning/calibration/decision_calibration.h"
 #include "core/learning/calibration_file.h"
 #include "core/model/hdf5_file.h"
 #include "core/model/hdf5_links.h"

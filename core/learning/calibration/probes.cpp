@@ -167,8 +167,7 @@ ShownProbes Prober::show(const View& view) {
   show_unknown(view, shown);
   if (view.hidden) show_hidden(view, shown);
   std::ranges::sort(shown.rivals);
-  const auto twice = std::ranges::unique(shown.rivals);
-  shown.rivals.erase(twice.begin(), twice.end());
+  shown.rivals.erase(std::unique(shown.rivals.begin(), shown.rivals.end()), shown.rivals.end());
   return shown;
 }
 

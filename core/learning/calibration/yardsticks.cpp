@@ -160,6 +160,7 @@ Yardsticks measure_yardsticks(const Model& model, const TrainingViews& views, co
   result.perturbation = options.perturbation;
   for (const auto& own : distances) {
     std::vector<double> squared;
+    squared.reserve(own.size());
     for (const ViewDistance& view : own)
       squared.push_back(view.full + std::max(0.0, view.missed[0]) / growth);
     result.typical_distance.push_back(std::sqrt(mean(squared)));
