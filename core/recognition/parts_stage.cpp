@@ -13,6 +13,15 @@ namespace {
 
 /// Other objects farther than this are no rivals, and terms of the evidence do not depend on them.
 constexpr double reach_of_others = 0.5;
+
+/// An object in the pose that fits best, compared with the whole region.
+WholeCandidate candidate_at(const AlignedPose& pose, AlignedMatch& match, const WholeRegion& region,
+                            std::size_t object) {
+  WholeCandidate candidate{object, pose.q, pose.misalignment, {}, {}, 0.0};
+  candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
+  return candidate;
+}
+
 /// Whether the windows see about as much of one object as of the other.
 bool tied(const Model& model, const WholeCandidate& a, const WholeCandidate& b) {
   const auto [less, more] = std::minmax(a.windows.discriminating, b.windows.discriminating);
@@ -29,10 +38,7 @@ WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDi
 
 WholeCandidate align_whole(const PartsRecognizer::Look& look, AlignedMatch& match, const WholeRegion& region,
                            std::size_t object) {
-  const AlignedPose& pose = match.align(look.pose_picture(), object).front();
-  WholeCandidate candidate{object, pose.q, pose.misalignment, {}, {}, 0.0};
-  candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
-  return candidate;
+  return candidate_at(match.align(look.pose_picture(), object).front(), match, region, object);
 }
 
 double lead_of(const Model& model, const WholeCandidate& first, const WholeCandidate& second) {
@@ -94,8 +100,7 @@ std::size_t PartsStage::judge(std::span<const float> picture, std::size_t neares
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   const PartsRecognizer::Look look = recognizer_.look(picture_);
   const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), nearest);
-  WholeCandidate candidate{nearest, aligned.front().q, aligned.front().misalignment, {}, {}, 0.0};
-  candidate.distance = match_.distance(picture, candidate.misalignment, {nearest});
+  const WholeCandidate candidate = candidate_at(aligned.front(), match_, {picture, {}}, nearest);
   return settle(look, aligned, candidate, outcome) ? nearest : vote(look, picture, candidate, outcome);
 }
 

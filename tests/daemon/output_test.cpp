@@ -1,8 +1,6 @@
 // What `eigenpose` does where it cannot write: a full disk, a full or closed standard output, a reader that
 // has gone; and where it cannot read: names, pipes, one picture of many.
 
-#include <array>
-#include <cstdio>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -11,12 +9,12 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "core/base/atomic_file.h"
 #include "core/dataset/image_set.h"
 #include "core/image/picture_file.h"
+#include "tests/daemon/shell.h"
 #include "tests/support/synthetic_objects.h"
 #include "tests/support/temporary_folder.h"
 
@@ -29,24 +27,6 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-struct Ended {
-  int code = -1;  ///< −1: killed by a signal
-  std::string output;
-};
-
-/// @param line what the shell runs; its stderr, and its stdout where the line leaves it, are `output`.
-Ended shell(const std::string& line) {
-  Ended result;
-  FILE* pipe = ::popen(("exec 2>&1; " + line).c_str(), "r");
-  if (pipe == nullptr) return result;
-  std::array<char, 4096> text{};
-  for (std::size_t n = 0; (n = std::fread(text.data(), 1, text.size(), pipe)) > 0;)
-    result.output.append(text.data(), n);
-  const int status = ::pclose(pipe);
-  result.code = WIFEXITED(status) && WEXITSTATUS(status) < 128 ? WEXITSTATUS(status) : -1;
-  return result;
-}
 
 class Output : public ::testing::Test {
  protected:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "core/base/parallel.h"
 #include "core/recognition/model_searches.h"
 
 namespace eigenpose {

@@ -192,8 +192,8 @@ void set_occlusion(const Probes& probes, std::size_t objects, DecisionModel& dec
       if (probe->occluded) evidence.push_back(evidence_of(decision.weights, probe->occluded->match));
     }
     std::ranges::sort(evidence);
-    // Regions that are not taken for occluded ones are not accepted as such: the others may be so much
-    // oftener.
+    // Regions that are not taken for occluded ones are not accepted as such: of the others, a larger share
+    // may be.
     const double share = shown == 0 ? 1.0 : static_cast<double>(evidence.size()) / static_cast<double>(shown);
     if (shown == 0 || rate < share)
       least = std::max(least, accepted_at(evidence, rate / share, objects, few_occluded));

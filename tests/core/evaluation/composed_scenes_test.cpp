@@ -140,7 +140,7 @@ TEST(ComposedScenes, AreCountedByTheirTruth) {
 }
 
 TEST(ComposedScenes, CountARegionForOneObjectAlone) {
-  // Two objects almost behind each other, of which one region was found.
+  // Two objects, one almost behind the other: they were found as one region.
   const ImageSet& set = learned_world().sets[0];
   ComposedScene scene;
   for (const int x : {10, 14}) scene.objects.push_back({{0, 0}, {x, 10, 50, 50}});

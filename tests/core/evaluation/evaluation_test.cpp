@@ -110,7 +110,7 @@ TEST(Evaluation, ShowsTheTestViewsToModelsWithoutTheirObjectToo) {
   for (const ObjectEvaluation& object : report.objects) EXPECT_EQ(object.counts.unknown, 12U);
 }
 
-/// The model without object `o`, taken apart by hand.
+/// The model with object `o` erased, member by member.
 std::shared_ptr<const Model> model_without(const Model& whole, std::size_t o,
                                            const LearningReport& learning) {
   auto rest = std::make_shared<Model>(whole);

@@ -84,7 +84,7 @@ TEST(OrientationGrid, HasTheMedianOfTheCornersAsBackgroundLevel) {
     maps.push_back(map_of(picture));
   }
   const auto found = background_level(maps);
-  // The corner cells are blurred over their neighbours, of which all show background too.
+  // The corner cells are blurred over their neighbours, which all show background too.
   EXPECT_NEAR(found[0], maps[1].brightness_at(2, 2)[0], 1e-6F);
   EXPECT_NEAR(found[1], maps[0].brightness_at(2, 2)[1], 1e-6F);
   EXPECT_EQ(background_level({}), (std::array<float, 3>{}));
