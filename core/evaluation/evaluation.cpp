@@ -101,6 +101,7 @@ std::shared_ptr<const Model> without_object(const Model& model, std::size_t obje
     parts->poses.erase(parts->poses.begin() + at);
     parts->calibration.erase(parts->calibration.begin() + at);
     parts->view_poses.erase(parts->view_poses.begin() + at);
+    if (!parts->colors.empty()) parts->colors.erase(parts->colors.begin() + at);
     if (!parts->extents.empty()) parts->extents.erase(parts->extents.begin() + at);
     rest->parts = std::move(parts);
   }

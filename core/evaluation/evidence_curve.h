@@ -2,8 +2,9 @@
 
 /// Both kinds of error against the threshold on evidence: the receiver operating characteristic (ROC).
 ///
-/// With threshold t a region is accepted where its evidence e ≥ t. For n₁ known views and n₀ views of unknown
-/// objects, e = −∞ for views without a matched region:
+/// With threshold t a region is accepted where its evidence e ≥ t. Where more or less was required of a
+/// region than of most (of occluded ones), e is what it has beyond its own requirement, added to the usual
+/// one. For n₁ known views and n₀ views of unknown objects, e = −∞ for views without a matched region:
 ///
 ///     false rejection(t)  = #{known:   e < t} / n₁
 ///     false acceptance(t) = #{unknown: e ≥ t} / n₀
@@ -31,7 +32,7 @@ struct EvidenceCurve {
   /// acceptance. The last has threshold ∞: nothing is accepted.
   std::vector<Point> points;
   /// As the records were decided: each region accepted where its evidence reaches its own required evidence.
-  /// The threshold is the upper median of those. On the curve where all regions required the same.
+  /// The threshold is the upper median of those.
   Point in_use;
   std::size_t known = 0;    ///< views
   std::size_t unknown = 0;  ///< views

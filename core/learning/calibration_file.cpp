@@ -9,10 +9,12 @@ namespace eigenpose {
 namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
-constexpr Eigen::Index windows_rows = 1 + 3 + 4;   // taken_for, whole, windows
-constexpr Eigen::Index occluded_rows = 1 + 4 + 4;  // taken_for, windows, and four more
+constexpr Eigen::Index color_rows = 1 + 2;  // whether there are any, ColorMatch
+constexpr Eigen::Index whole_rows = 3 + color_rows;
+constexpr Eigen::Index windows_rows = 1 + whole_rows + 4;       // taken_for, whole, windows
+constexpr Eigen::Index occluded_rows = 1 + 4 + 4 + color_rows;  // taken_for, windows, four more, colours
 constexpr Eigen::Index probe_rows =
-    1 + 3 + 3 + 1 + windows_rows + 1 + occluded_rows;  // view, what for, whole …
+    1 + 3 + whole_rows + 1 + windows_rows + 1 + occluded_rows;  // view, what for, whole …
 
 /// Numbers of one probe on their way into a column.
 class ColumnWriter {
@@ -76,10 +78,20 @@ class ColumnReader {
   Eigen::Index row_ = 0;
 };
 
+void visit_color(auto& match, auto& column) {
+  if (column.present(match)) {
+    column.number(match->distance);
+    column.number(match->typical);
+  } else {
+    column.skip(color_rows - 1);
+  }
+}
+
 void visit_whole(auto& match, auto& column) {
   column.number(match.distance);
   column.number(match.typical);
   column.number(match.other);
+  visit_color(match.color, column);
 }
 
 void visit_windows(auto& match, auto& column) {
@@ -109,6 +121,7 @@ void visit_probe(auto& probe, std::size_t objects, auto& column) {
     column.number(probe.occluded->match.merit);
     column.number(probe.occluded->match.unexplained);
     column.number(probe.occluded->match.foreign_likeness);
+    visit_color(probe.occluded->match.color, column);
   } else {
     column.skip(occluded_rows);
   }
@@ -136,6 +149,10 @@ void write_object(const Hdf5Group& group, const ObjectRecord& record) {
   column = 0;
   for (const auto& shares : record.votes.votes) votes.col(column++) << shares[0], shares[1], shares[2];
   write_columns(group, "votes", votes);
+  Eigen::MatrixXd colors(2, static_cast<Eigen::Index>(record.votes.colors.size()));
+  column = 0;
+  for (const auto& distances : record.votes.colors) colors.col(column++) << distances[0], distances[1];
+  write_columns(group, "colors", colors);
   group.write("foreign", record.votes.foreign);
 }
 
@@ -143,13 +160,15 @@ ObjectRecord read_object_record(const Hdf5Group& group, const ObjectViews& objec
   ObjectRecord record;
   const Eigen::MatrixXd misalignments = read_columns(group, "misalignments", Misalignment::unknowns);
   const Eigen::MatrixXd votes = read_columns(group, "votes", 3);
+  const Eigen::MatrixXd colors = read_columns(group, "colors", 2);
   record.votes.foreign = group.read_double("foreign");
   if (misalignments.cols() != static_cast<Eigen::Index>(object.count) || !misalignments.allFinite() ||
-      !votes.allFinite() || !std::isfinite(record.votes.foreign))
+      !votes.allFinite() || !colors.allFinite() || !std::isfinite(record.votes.foreign))
     throw Hdf5Failure("has a calibration that does not fit its views");
   for (const auto& m : misalignments.colwise())
     record.misalignments.push_back({m(0), m(1), m(2), m(3), m(4)});
   for (const auto& shares : votes.colwise()) record.votes.votes.push_back({shares(0), shares(1), shares(2)});
+  for (const auto& distances : colors.colwise()) record.votes.colors.push_back({distances(0), distances(1)});
   return record;
 }
 

@@ -5,9 +5,9 @@
 /// Group `calibration`, attributes measured_among, changes:
 ///
 ///     objects/000000…  misalignments (5 × n: gain, dx, dy, scale, rotation),
-///                      votes (3 × views that voted), attribute foreign
+///                      votes (3 × views that voted), colors (2 × the same), attribute foreign
 ///     shown            4 × S: object, view, windows, hidden
-///     probes           26 × P: index of the shown view, then the members of a Probe
+///     probes           35 × P: index of the shown view, then the members of a Probe
 ///                      in their order; NaN for none
 ///     rivals           2 × R: index of the shown view, object
 

@@ -172,7 +172,8 @@ CalibrationRecord calibrate(const Run& run, const Learned& learned, CalibrationR
   for (std::size_t o = 0; o < model.objects.size(); ++o)
     model.objects[o].typical_distance = yardsticks.typical_distance[o];
   if (parts) parts->calibration = yardsticks.windows;
-  model.decision.weights = prior_weights();
+  model.decision.weights =
+      prior_weights(parts && !parts->colors.empty() ? ViewColors::some : ViewColors::none);
   if (!kept.objects.empty()) {
     drop_within_reach(kept, model, views, points);
     probe.kept = &kept;

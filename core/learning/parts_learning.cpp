@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "core/base/parallel.h"
 #include "core/base/statistics.h"
@@ -126,6 +127,12 @@ AlignmentEigenspace learn_alignment(const PartsViews& views) {
   return AlignmentEigenspace::learn(views.axes, pictures, views.poses);
 }
 
+ColorViews learn_colors(const PartsViews& views, const std::array<float, 3>& background) {
+  std::vector<ChromaticityMap> maps;
+  for (std::size_t v = 0; v < views.count; ++v) maps.push_back(chromaticity_map(views.view(v), background));
+  return ColorViews(std::move(maps));
+}
+
 double median_left_out_error(const std::vector<AlignmentEigenspace>& spaces) {
   std::vector<double> medians;
   for (const AlignmentEigenspace& space : spaces) {
@@ -205,6 +212,7 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   model.poses.resize(count);
   model.calibration.resize(count);  // yardsticks come from core/learning/calibration
   model.view_poses.resize(count);
+  if (model.bands == 3) model.colors.resize(count);
 
   Grids grids = compute_grids(objects, options, stop, model);
   model.space = WindowSpace::learn(grids.grids, options.threads);
@@ -217,6 +225,7 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
     model.objects[o].store = WindowStore(windows[o], model.scale);
     windows[o].clear();
     model.poses[o] = learn_alignment(objects[o]);
+    if (model.bands == 3) model.colors[o] = learn_colors(objects[o], model.background);
     model.view_poses[o] = objects[o].poses.size() > 0 ? objects[o].poses : grid_poses(objects[o].axes);
     alignment_meter.finished(1);
   });

@@ -18,7 +18,7 @@
 namespace eigenpose {
 namespace {
 
-constexpr SealedFormat views_format{"eigenpose views\n", 2,
+constexpr SealedFormat views_format{"eigenpose views\n", 3,
                                     "is no file of kept views; 'eigenpose learn --keep-views' makes them",
                                     "learn the model again from its image sets, with --keep-views"};
 

@@ -10,8 +10,11 @@ bool DecisionModel::gives_up_false_rejection() const {
   return held_for_acceptance && expected.false_rejection > std::max(set.false_rejection, smallest_rate());
 }
 
-double DecisionModel::distance_of(double evidence, double typical) const {
-  const auto& [offset, slope, yardstick] = weights.whole;
+double DecisionModel::distance_of(double evidence, double typical,
+                                  std::optional<double> typical_color) const {
+  const auto& [offset, slope, yardstick, color_slope, color_yardstick] = weights.whole;
+  if (typical_color)
+    evidence -= (color_slope + color_yardstick) * std::log(std::max(*typical_color, least_color_distance));
   if (slope >= 0.0) return std::numeric_limits<double>::infinity();
   return std::exp((evidence - offset - yardstick * std::log(std::max(typical, least_distance))) / slope);
 }

@@ -6,19 +6,22 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace eigenpose {
 
 /// Distances below this are measured as this: nothing is nearer than noise.
 inline constexpr double least_distance = 1e-4;
+/// The same for distances of colours.
+inline constexpr double least_color_distance = 0.02;
 
 /// Log-odds linear in what was measured (logistic regression). What each weight multiplies is defined by
 /// `whole_terms`, `windows_terms` and `occluded_terms` of core/recognition/decision.h.
 struct EvidenceWeights {
-  std::array<double, 3> whole{};     ///< of the whole region alone
-  std::array<double, 8> windows{};   ///< of the whole region and its windows together
-  std::array<double, 9> occluded{};  ///< of a region that is partly occluded
+  std::array<double, 5> whole{};      ///< of the whole region alone
+  std::array<double, 10> windows{};   ///< of the whole region and its windows together
+  std::array<double, 11> occluded{};  ///< of a region that is partly occluded
 
   friend bool operator==(const EvidenceWeights&, const EvidenceWeights&) = default;
 };
@@ -78,6 +81,8 @@ struct DecisionModel {
   EvidenceWeights weights;
   /// A region with less evidence (log-odds) for its best object is unknown.
   double required = std::numeric_limits<double>::infinity();
+  /// The same of a region that is taken for a partly occluded object.
+  double required_occluded = std::numeric_limits<double>::infinity();
   /// With this much evidence of the whole region alone, windows are not looked at; ≥ required.
   double settled = std::numeric_limits<double>::infinity();
   /// `required` is what the rate of false acceptances asks for, more than that of false rejections does.
@@ -85,16 +90,20 @@ struct DecisionModel {
   DecisionRates set;       ///< by the user
   DecisionRates expected;  ///< what the learned views say that `required` holds
   /// Evidence of learned views shown as new, and of learned objects shown as unknown; rising. They are the
-  /// curve of both rates: `rates_at`.
+  /// curve of both rates: `rates_at`. Of occluded ones, what they have beyond `required_occluded` is added to
+  /// `required`.
   std::vector<double> known;
   std::vector<double> unknown;
   Tuning tuning;
 
   /// The smallest rate of false rejections that the number of views can support, 1/(n + 1).
   [[nodiscard]] double smallest_rate() const { return 1.0 / (static_cast<double>(known.size()) + 1.0); }
-  /// The distance at which a whole region alone has this evidence for an object of that typical distance;
-  /// infinite where evidence does not fall with distance.
-  [[nodiscard]] double distance_of(double evidence, double typical) const;
+  /// The distance at which a whole region alone has this evidence for an object of that typical distance, and
+  /// of that typical distance of colours, with colours so far from it; infinite where evidence does not fall
+  /// with distance.
+  /// @param typical_color nothing where views have no colours.
+  [[nodiscard]] double distance_of(double evidence, double typical,
+                                   std::optional<double> typical_color = std::nullopt) const;
   /// The threshold holds the rate of false acceptances alone, and more known views are expected below it than
   /// were set, and than the number of views explains.
   [[nodiscard]] bool gives_up_false_rejection() const;

@@ -57,9 +57,12 @@ struct Model {
   DecisionModel decision;
   Provenance provenance;
 
-  /// A whole region farther from object `o` is unknown, unless its windows say more.
+  /// A whole region farther from object `o`, with the colours of a usual view, is unknown, unless its windows
+  /// say more.
   [[nodiscard]] double rejection_distance(std::size_t o) const {
-    return decision.distance_of(decision.required, objects[o].typical_distance);
+    const bool colors = parts && !parts->colors.empty();
+    return decision.distance_of(decision.required, objects[o].typical_distance,
+                                colors ? std::optional(parts->calibration[o].typical_color) : std::nullopt);
   }
   /// Bytes held for object `o` alone: windows, pose space, own eigenspace.
   [[nodiscard]] std::size_t memory(std::size_t o) const {

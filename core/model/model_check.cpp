@@ -99,6 +99,7 @@ void check_windows(const std::string& of, const PartsObject& object, std::size_t
 void check_calibration(const std::string& of, const PartsCalibration& calibration) {
   check_range(of + "the typical votes", calibration.typical_votes, 0, 1);
   check_range(of + "the share of foreign windows", calibration.foreign_share, 0, 1);
+  check_range(of + "the typical distance of colours", calibration.typical_color, 0, 1);
 }
 
 void check_alignment(const std::string& of, const AlignmentEigenspace& space) {
@@ -118,6 +119,11 @@ void check_extents(const std::string& of, const PartsModel& parts, std::size_t o
     refuse(of + "the sizes of regions do not fit the views");
 }
 
+void check_colors(const std::string& of, const PartsModel& parts, std::size_t o, std::size_t views) {
+  if (!parts.colors.empty() && parts.colors[o].maps().size() != views)
+    refuse(of + "the colours do not fit the views");
+}
+
 void check_voting(const VotingOptions& voting) {
   check_range("the reach of windows (cells)", voting.tolerance.cells, 0, WindowGrid::side);
   check_not_negative("the penalty of moved windows", voting.tolerance.penalty);
@@ -130,7 +136,8 @@ void check_voting(const VotingOptions& voting) {
 void check_parts(const Model& model, const PartsModel& parts) {
   const std::size_t count = model.objects.size();
   if (parts.objects.size() != count || parts.poses.size() != count || parts.calibration.size() != count ||
-      parts.view_poses.size() != count || (!parts.extents.empty() && parts.extents.size() != count))
+      parts.view_poses.size() != count || (!parts.extents.empty() && parts.extents.size() != count) ||
+      parts.colors.size() != (parts.bands == 3 ? count : 0))
     refuse("the windows do not fit the objects");
   if (parts.bands != 1 && parts.bands != 3) refuse("the windows are neither of colour nor of grey pictures");
   for (const float level : parts.background) check_not_negative("the background of windows", level);
@@ -148,6 +155,7 @@ void check_parts(const Model& model, const PartsModel& parts) {
     check_calibration(of, parts.calibration[o]);
     check_alignment(of, parts.poses[o]);
     check_extents(of, parts, o, views);
+    check_colors(of, parts, o, views);
   }
 }
 
@@ -167,6 +175,7 @@ void check_decision(const DecisionModel& decision) {
   check_all_finite("the weights of windows", decision.weights.windows);
   check_all_finite("the weights of occluded regions", decision.weights.occluded);
   check_range("the required evidence", decision.required, -1e12, unlimited);
+  check_range("the required evidence of occluded regions", decision.required_occluded, -1e12, unlimited);
   check_range("the evidence that settles", decision.settled, decision.required, unlimited);
   check_rates("set", decision.set);
   check_rates("expected", decision.expected);

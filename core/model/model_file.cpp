@@ -20,7 +20,7 @@
 namespace eigenpose {
 namespace {
 
-constexpr SealedFormat model_format{"eigenpose model\n", 4,
+constexpr SealedFormat model_format{"eigenpose model\n", 5,
                                     "is not an eigenpose model; 'eigenpose learn' makes them",
                                     "learn it again from its image sets"};
 
@@ -121,6 +121,7 @@ void write_decision(const Hdf5Group& group, const DecisionModel& decision) {
   write_weights(group, "windows_weights", decision.weights.windows);
   write_weights(group, "occluded_weights", decision.weights.occluded);
   group.write("required", decision.required);
+  group.write("required_occluded", decision.required_occluded);
   group.write("settled", decision.settled);
   group.write("held_for_acceptance", std::int64_t{decision.held_for_acceptance});
   group.write("set_false_rejection", decision.set.false_rejection);
@@ -139,6 +140,7 @@ DecisionModel read_decision(const Hdf5Group& group) {
   read_weights(group, "windows_weights", decision.weights.windows);
   read_weights(group, "occluded_weights", decision.weights.occluded);
   decision.required = group.read_double("required");
+  decision.required_occluded = group.read_double("required_occluded");
   decision.settled = group.read_double("settled");
   decision.held_for_acceptance = group.read_bool("held_for_acceptance");
   decision.set = {group.read_double("set_false_rejection"), group.read_double("set_false_acceptance")};

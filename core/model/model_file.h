@@ -6,7 +6,8 @@
 ///
 ///     /normalization   attributes size, color, type, cropped, …
 ///     /eigenspace      mean (N), basis (K×N), eigenvalues (K), attribute total_scatter
-///     /decision        weights, required, settled, rates; known and unknown evidence; tuning
+///     /decision        weights, required, required_occluded, settled, rates; known and unknown evidence;
+///                      tuning
 ///     /objects/0000…   attributes name, typical_distance, …; coefficients (count×K);
 ///                      axes/0… attributes name, unit, lower, upper, periodic; samples (n)
 ///     /parts           windows and alignment eigenspaces, see parts_file.h

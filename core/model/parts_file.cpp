@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 namespace eigenpose {
 namespace {
@@ -126,6 +128,29 @@ Eigen::MatrixXd read_view_poses(const Hdf5Group& group, const AlignmentEigenspac
   return poses;
 }
 
+/// One row of numbers a view.
+void write_colors(const Hdf5Group& group, const ColorViews& colors) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(colors.maps().size() * ChromaticityMap::numbers);
+  for (const ChromaticityMap& map : colors.maps())
+    for (const auto* plane : {&map.u, &map.v, &map.brightness})
+      bytes.insert(bytes.end(), plane->begin(), plane->end());
+  group.write("colors", bytes);
+}
+
+ColorViews read_colors(const Hdf5Group& group, std::size_t views) {
+  std::vector<std::uint8_t> bytes(views * ChromaticityMap::numbers);
+  group.read_bytes("colors", bytes);
+  std::vector<ChromaticityMap> maps(views);
+  auto from = bytes.begin();
+  for (ChromaticityMap& map : maps)
+    for (auto* plane : {&map.u, &map.v, &map.brightness}) {
+      std::copy_n(from, plane->size(), plane->begin());
+      from += static_cast<std::ptrdiff_t>(plane->size());
+    }
+  return ColorViews(std::move(maps));
+}
+
 }  // namespace
 
 void write_parts(const Hdf5Group& group, const PartsModel& parts) {
@@ -145,6 +170,8 @@ void write_parts(const Hdf5Group& group, const PartsModel& parts) {
     write_windows(object, parts.objects[o]);
     object.write("typical_votes", parts.calibration[o].typical_votes);
     object.write("foreign_share", parts.calibration[o].foreign_share);
+    object.write("typical_color", parts.calibration[o].typical_color);
+    if (!parts.colors.empty()) write_colors(object, parts.colors[o]);
     object.write("extents",
                  extents_matrix(o < parts.extents.size() ? parts.extents[o] : std::vector<cv::Size>()));
     const AlignmentEigenspace& pose = parts.poses[o];
@@ -181,6 +208,7 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
     PartsCalibration calibration;
     calibration.typical_votes = object.read_double("typical_votes");
     calibration.foreign_share = object.read_double("foreign_share");
+    calibration.typical_color = object.read_double("typical_color");
     parts.calibration.push_back(calibration);
     parts.extents.push_back(read_extents(object.read_doubles("extents"), parts.objects.back()));
     const Hdf5Group coarse = object.open_group("coarse");
@@ -189,6 +217,8 @@ PartsModel read_parts(const Hdf5Group& group, const std::vector<ModelObject>& ob
         read_scale(coarse), read_scale(fine), object.read_floats("pixel_mean"),
         read_manifold(coarse, objects[o].manifold), read_manifold(fine, objects[o].manifold)));
     parts.view_poses.push_back(read_view_poses(object, parts.poses.back(), parts.objects.back()));
+    if (parts.bands == 3)
+      parts.colors.push_back(read_colors(object, static_cast<std::size_t>(parts.view_poses.back().cols())));
   }
   return parts;
 }

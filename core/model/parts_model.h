@@ -11,15 +11,17 @@
 #include <opencv2/core.hpp>
 
 #include "core/alignment/alignment_eigenspace.h"
+#include "core/color/color_views.h"
 #include "core/windows/partial_match.h"
 #include "core/windows/windows.h"
 
 namespace eigenpose {
 
-/// What an object's own views say of how well its windows match.
+/// What an object's own views say of how well its windows and its colours match.
 struct PartsCalibration {
   double typical_votes = 0.5;  ///< share of the windows' weight that a new view of the object gets, mean
   double foreign_share = 0.1;  ///< a region with a larger share of foreign windows may be occluded
+  double typical_color = 0.0;  ///< distance of the colours of a new view, mean; 0 of grey views
 };
 
 /// Everything partial matching and alignment know. Immutable once learned; share it between threads.
@@ -39,10 +41,12 @@ struct PartsModel {
   /// of an object that came ready-cut; nothing at all where all objects did. Separates objects that touch, as
   /// long as the camera stays where it was.
   std::vector<std::vector<cv::Size>> extents;
+  std::vector<ColorViews> colors;  ///< one an object; nothing at all where views are grey
 
   /// Bytes held for one object.
   [[nodiscard]] std::size_t memory(std::size_t object) const {
-    return objects[object].store.memory() + poses[object].memory();
+    return objects[object].store.memory() + poses[object].memory() +
+           (colors.empty() ? 0 : colors[object].memory());
   }
 };
 

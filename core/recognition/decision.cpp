@@ -29,30 +29,44 @@ double vote_gap(const WindowsMatch& match) {
   return std::log(std::max(*match.next, least_share) / std::max(match.discriminating, least_share));
 }
 
+/// Zeros where there are no colours.
+std::array<double, 2> color_terms(const std::optional<ColorMatch>& match) {
+  if (!match) return {};
+  const auto log_of = [](double h) { return std::log(std::max(h, least_color_distance)); };
+  return {log_of(match->distance), log_of(match->typical)};
+}
+
+template <std::size_t n>
+std::array<double, n + 2> joined(const std::array<double, n>& terms, const std::array<double, 2>& colors) {
+  std::array<double, n + 2> all{};
+  std::ranges::copy(terms, all.begin());
+  std::ranges::copy(colors, all.begin() + n);
+  return all;
+}
+
 }  // namespace
 
-std::array<double, 3> whole_terms(const WholeMatch& match) {
-  return {1.0, log_distance(match.distance), log_distance(match.typical)};
+std::array<double, 5> whole_terms(const WholeMatch& match) {
+  return joined(std::array{1.0, log_distance(match.distance), log_distance(match.typical)},
+                color_terms(match.color));
 }
 
-std::array<double, 8> windows_terms(const WholeMatch& whole, const WindowsMatch& windows) {
-  return {1.0,
-          log_distance(whole.distance),
-          log_distance(whole.typical),
-          log_distance(std::min(whole.other, far)),
-          windows.votes,
-          windows.typical_votes,
-          windows.discriminating,
-          vote_gap(windows)};
+std::array<double, 10> windows_terms(const WholeMatch& whole, const WindowsMatch& windows) {
+  return joined(std::array{1.0, log_distance(whole.distance), log_distance(whole.typical),
+                           log_distance(std::min(whole.other, far)), windows.votes, windows.typical_votes,
+                           windows.discriminating, vote_gap(windows)},
+                color_terms(whole.color));
 }
 
-std::array<double, 9> occluded_terms(const OccludedMatch& match) {
-  return {1.0, match.windows.votes, match.windows.typical_votes, match.windows.discriminating,
-          vote_gap(match.windows), match.occluded, 0.01 * match.merit,
-          // An occluder hides windows and pixels alike; what differs in colour only changes windows.
-          std::abs(match.occluded - match.unexplained),
-          // An occluder is nothing like the object; another object may be a little.
-          match.foreign_likeness};
+std::array<double, 11> occluded_terms(const OccludedMatch& match) {
+  return joined(
+      std::array{1.0, match.windows.votes, match.windows.typical_votes, match.windows.discriminating,
+                 vote_gap(match.windows), match.occluded, 0.01 * match.merit,
+                 // An occluder hides windows and pixels alike; what differs in colour only changes windows.
+                 std::abs(match.occluded - match.unexplained),
+                 // An occluder is nothing like the object; another object may be a little.
+                 match.foreign_likeness},
+      color_terms(match.color));
 }
 
 double evidence_of(const EvidenceWeights& weights, const WholeMatch& match) {

@@ -11,7 +11,8 @@
 /// own interpolation error s, that of an unknown one does not: with both logarithms normal, their likelihood
 /// ratio is linear in ln d and ln s. Weights are learned from the model's own views (core/learning/
 /// calibration). A region gets the name of the object that its windows or its distances choose
-/// (parts_stage.h, recognizer.h), if the evidence for it is at least DecisionModel::required.
+/// (parts_stage.h, recognizer.h), if the evidence for it is at least DecisionModel::required, or
+/// required_occluded.
 ///
 /// **Confidence** is the posterior that the best object b is right, beside the second best r and an unknown
 /// object: e^Λ(b) / (e^Λ(b) + e^Λ(r) + 1).
@@ -23,11 +24,18 @@
 
 namespace eigenpose {
 
+/// Colours of one object compared with those of a region, or of what is visible of it.
+struct ColorMatch {
+  double distance = 0.0;  ///< h: Hellinger distance to the nearest learned view
+  double typical = 0.0;   ///< that of new views of the object, mean
+};
+
 /// One object compared with the whole region, after alignment where the model aligns.
 struct WholeMatch {
   double distance = 0.0;  ///< d: to the object's manifold in the universal eigenspace
   double typical = 0.0;   ///< s: root mean square of new views of the object
   double other = 2.0;     ///< to the nearest of the other manifolds
+  std::optional<ColorMatch> color = std::nullopt;  ///< where views have colours
 };
 
 /// Votes of the windows for one object.
@@ -45,11 +53,12 @@ struct OccludedMatch {
   double merit = 0.0;             ///< of the pose, see parts_recognizer.h
   double unexplained = 0.0;       ///< share of the pixels that the pose leaves unexplained, 0…1
   double foreign_likeness = 0.0;  ///< mean likeness of the windows that do not show the object
+  std::optional<ColorMatch> color = std::nullopt;  ///< of what is visible, where views have colours
 };
 
-std::array<double, 3> whole_terms(const WholeMatch& match);
-std::array<double, 8> windows_terms(const WholeMatch& whole, const WindowsMatch& windows);
-std::array<double, 9> occluded_terms(const OccludedMatch& match);
+std::array<double, 5> whole_terms(const WholeMatch& match);
+std::array<double, 10> windows_terms(const WholeMatch& whole, const WindowsMatch& windows);
+std::array<double, 11> occluded_terms(const OccludedMatch& match);
 
 /// Λ of the three hypotheses.
 double evidence_of(const EvidenceWeights& weights, const WholeMatch& match);

@@ -26,6 +26,7 @@ constexpr double rival_votes = 0.8;
 constexpr float familiar_likeness = 0.6F;                 // a window with this κ is fully trusted
 constexpr double most_unexplained = 0.5 * 9.0 * 32 * 32;  // every pixel 3 σ off
 constexpr double masked_reach = 12.0 / 360.0;
+constexpr int trust_side = 32;  // pixels of the visible part
 
 }  // namespace
 
@@ -48,7 +49,7 @@ std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
       }
     }
   }
-  constexpr int side = 32;
+  constexpr int side = trust_side;
   std::vector<float> weights(static_cast<std::size_t>(side) * side);
   for (int r = 0; r < side; ++r) {
     for (int c = 0; c < side; ++c) {
@@ -58,6 +59,22 @@ std::vector<float> PartsRecognizer::Impl::pixel_trust() const {
     }
   }
   return weights;
+}
+
+std::optional<ColorMatch> PartsRecognizer::Impl::color_match_of_visible(std::size_t object,
+                                                                        std::span<const float> trust) {
+  if (model.colors.empty()) return std::nullopt;
+  make_colors();
+  constexpr int block = trust_side / ChromaticityMap::side;
+  std::array<float, ChromaticityMap::pixels> visible{};
+  for (int y = 0; y < trust_side; ++y)
+    for (int x = 0; x < trust_side; ++x)
+      visible[static_cast<std::size_t>(y / block * ChromaticityMap::side + x / block)] +=
+          trust[static_cast<std::size_t>(y * trust_side + x)] / static_cast<float>(block * block);
+  const std::span<const int> left_out =
+      object == left_out_object ? std::span<const int>(left_out_views) : std::span<const int>();
+  return ColorMatch{model.colors[object].distance(colors, visible, left_out),
+                    model.calibration[object].typical_color};
 }
 
 PoseVector PartsRecognizer::Impl::voted_pose(std::size_t object, const std::vector<float>& plain,
@@ -168,24 +185,26 @@ std::vector<OccludedAnswer> PartsRecognizer::Impl::find_rivals() {
   return rivals;
 }
 
-double PartsRecognizer::Impl::gain_of_masking(const PartsAnswer& answer) {
-  const auto above_noise = [this](double cost) { return std::log(std::max(cost, model.noise)); };
-  return above_noise(aligner.align(posed(), model.poses[answer.object]).front().cost) -
-         above_noise(answer.poses.front().cost);
-}
-
 PartsIdentification PartsRecognizer::Impl::identify_occluded() {
   const std::vector<OccludedAnswer> rivals = find_rivals();
   PartsIdentification found;
   found.best = rivals[0].answer;
-  const double merit = found.best.poses.front().merit;
-  found.match = {match_of(found.best.object, votes_of(found.best.object)), found.best.occluded, merit,
-                 found.best.poses.front().unexplained, found.best.foreign_likeness};
+  const PartsPose& pose = found.best.poses.front();
+  found.match = {match_of(found.best.object, votes_of(found.best.object)),
+                 found.best.occluded,
+                 pose.merit,
+                 pose.unexplained,
+                 found.best.foreign_likeness,
+                 color_match_of_visible(found.best.object, rivals[0].trust)};
+  const auto above_noise = [this](double cost) { return std::max(cost, model.noise); };
+  found.masking_gain =
+      std::log(above_noise(aligner.align(posed(), model.poses[found.best.object]).front().cost) /
+               above_noise(pose.cost));
   found.evidence = evidence_of(decision.weights, found.match);
   found.second_evidence = -std::numeric_limits<double>::infinity();
   if (rivals.size() > 1) {
     found.second = rivals[1].answer;
-    found.second_evidence = found.evidence - (merit - found.second->poses.front().merit);
+    found.second_evidence = found.evidence - (pose.merit - found.second->poses.front().merit);
   }
   return found;
 }

@@ -52,6 +52,21 @@ const PosePicture& PartsRecognizer::Impl::posed() {
   return pose_picture;
 }
 
+void PartsRecognizer::Impl::make_colors() {
+  if (colors_made) return;
+  colors = chromaticity_map(picture, model.background);
+  color_roots = chromaticity_roots(colors);
+  colors_made = true;
+}
+
+std::optional<ColorMatch> PartsRecognizer::Impl::color_match(std::size_t object,
+                                                             std::span<const int> left_out) {
+  if (model.colors.empty()) return std::nullopt;
+  make_colors();
+  return ColorMatch{model.colors[object].distance(color_roots, left_out),
+                    model.calibration[object].typical_color};
+}
+
 const std::vector<float>& PartsRecognizer::Impl::votes_of(std::size_t object) {
   matcher.plain_votes(object, plain_votes);
   return plain_votes;
@@ -108,8 +123,8 @@ PartsAnswer PartsRecognizer::Impl::find_poses(std::size_t object, const std::vec
     return QueryWindows::count * pose.votes - 0.5 * pose.cost / model.noise;
   };
   for (const AlignedPose& found : aligner.align(posed(), space)) {
-    PartsPose pose{
-        found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0, 0.0, 0.0};
+    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+                   0.0};
     pose.votes = votes_near(plain, parts, space, model.view_poses[object], pose.q) / windows.total_weight;
     pose.merit = merit(pose);
     answer.poses.push_back(pose);
@@ -146,6 +161,7 @@ PartsRecognizer::Look PartsRecognizer::look(const cv::Mat& picture) {
   impl_->windows_made = false;
   impl_->pixels_made = false;
   impl_->pose_picture_made = false;
+  impl_->colors_made = false;
   ++impl_->votes;  // those of the picture before are no longer valid
   return {*impl_, ++impl_->pictures};
 }
@@ -159,6 +175,11 @@ PartsRecognizer::Impl& PartsRecognizer::Look::impl() const {
 
 const PosePicture& PartsRecognizer::Look::pose_picture() const {
   return impl().posed();
+}
+
+std::optional<ColorMatch> PartsRecognizer::Look::color_match(std::size_t object,
+                                                             std::span<const int> left_out) const {
+  return impl().color_match(object, left_out);
 }
 
 PartsRecognizer::Votes PartsRecognizer::Look::vote(std::span<const std::size_t> shortlist) const {
@@ -197,10 +218,6 @@ PartsIdentification PartsRecognizer::Votes::identify_occluded() const {
   return impl().identify_occluded();
 }
 
-double PartsRecognizer::Votes::gain_of_masking(const PartsAnswer& answer) const {
-  return impl().gain_of_masking(answer);
-}
-
 PartsRecognizer::Votes PartsRecognizer::Votes::without(std::size_t object, std::span<const int> views) const {
   impl().vote_without(object, views);
   return {*impl_, impl_->votes};
@@ -213,6 +230,7 @@ void PartsRecognizer::Impl::vote(std::span<const std::size_t> shortlist) {
     windows_made = true;
   }
   ++votes;
+  left_out_views.clear();
   ranked = matcher.match(windows, shortlist.empty() ? std::span<const std::size_t>(everything) : shortlist);
 }
 
@@ -223,6 +241,8 @@ void PartsRecognizer::Impl::vote_without(std::size_t object, std::span<const int
     if (std::ranges::find(views, parts.candidates[c].view) != views.end())
       candidates.push_back(static_cast<int>(c));
   ranked = matcher.match_without(object, candidates);
+  left_out_object = object;
+  left_out_views.assign(views.begin(), views.end());
   ++votes;
 }
 

@@ -13,6 +13,7 @@
 
 #include "core/alignment/alignment.h"
 #include "core/alignment/masked_alignment.h"
+#include "core/color/chromaticity.h"
 #include "core/recognition/parts_recognizer.h"
 #include "core/windows/orientation_grid.h"
 #include "core/windows/partial_match.h"
@@ -75,8 +76,14 @@ struct PartsRecognizer::Impl {
   QueryWindows aligned_windows;
   PosePicture pose_picture;  ///< likewise
   bool pose_picture_made = false;
+  ChromaticityMap colors;  ///< likewise
+  ChromaticityRoots color_roots{};
+  bool colors_made = false;
   std::uint64_t pictures = 0;  ///< looked at so far
   std::uint64_t votes = 0;     ///< taken so far
+  /// Views that do not vote, and that colours are not compared with.
+  std::size_t left_out_object = 0;
+  std::vector<int> left_out_views;
   std::span<const PartialVote> ranked;
   std::vector<float> plain_votes;    ///< of one object's views, in the picture
   std::vector<float> aligned_votes;  ///< the same in the aligned one
@@ -84,14 +91,16 @@ struct PartsRecognizer::Impl {
   std::vector<float> background;
 
   const PosePicture& posed();
+  void make_colors();
+  std::optional<ColorMatch> color_match(std::size_t object, std::span<const int> left_out);
+  /// Of the pixels that are visible. @param trust of them, as pixel_trust gives it.
+  std::optional<ColorMatch> color_match_of_visible(std::size_t object, std::span<const float> trust);
   void vote(std::span<const std::size_t> shortlist);
   void vote_without(std::size_t object, std::span<const int> views);
   WindowsMatch match_of(std::size_t object, const std::vector<float>& plain) const;
   /// Poses of one object on the visible pixels. @param occluded its share.
   PartsAnswer find_occluded_poses(std::size_t object, const std::vector<float>& plain, double occluded);
   PartsIdentification identify_occluded();
-  /// ln of the cost of the best pose over all pixels, over that of the best pose over the visible ones.
-  double gain_of_masking(const PartsAnswer& answer);
   const std::vector<float>& votes_of(std::size_t object);
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   /// How much of the picture one candidate, or its neighbours, do not explain. Leaves κ in `likeness`.

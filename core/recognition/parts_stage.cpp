@@ -15,9 +15,9 @@ namespace {
 constexpr double reach_of_others = 0.5;
 
 /// An object in the pose that fits best, compared with the whole region.
-WholeCandidate candidate_at(const AlignedPose& pose, AlignedMatch& match, const WholeRegion& region,
-                            std::size_t object) {
-  WholeCandidate candidate{object, pose.q, pose.misalignment, {}, {}, 0.0};
+WholeCandidate candidate_at(const AlignedPose& pose, const PartsRecognizer::Look& look, AlignedMatch& match,
+                            const WholeRegion& region, std::size_t object) {
+  WholeCandidate candidate{object, pose.q, pose.misalignment, {}, look.color_match(object), {}, 0.0};
   candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
   return candidate;
 }
@@ -30,15 +30,17 @@ bool tied(const Model& model, const WholeCandidate& a, const WholeCandidate& b) 
 
 }  // namespace
 
-WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDistance& distance) {
+WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDistance& distance,
+                       const std::optional<ColorMatch>& color) {
   WholeMatch match{distance.own, model.objects[object].typical_distance};
+  match.color = color;
   if (distance.other) match.other = distance.other->distance;
   return match;
 }
 
 WholeCandidate align_whole(const PartsRecognizer::Look& look, AlignedMatch& match, const WholeRegion& region,
                            std::size_t object) {
-  return candidate_at(match.align(look.pose_picture(), object).front(), match, region, object);
+  return candidate_at(match.align(look.pose_picture(), object).front(), look, match, region, object);
 }
 
 double lead_of(const Model& model, const WholeCandidate& first, const WholeCandidate& second) {
@@ -59,8 +61,8 @@ WholeCandidates compare_whole(const Model& model, const PartsRecognizer::Look& l
     WholeCandidate candidate =
         vote.object == aligned.object ? aligned : align_whole(look, match, region, vote.object);
     candidate.windows = votes.match(vote.object);
-    candidate.evidence = evidence_of(model.decision.weights,
-                                     whole_match(model, vote.object, candidate.distance), candidate.windows);
+    candidate.evidence =
+        evidence_of(model.decision.weights, whole_match(model, candidate), candidate.windows);
     candidates.push_back(candidate);
   }
   if (candidates.full() && lead_of(model, candidates[0], candidates[1]) < 0.0)
@@ -76,7 +78,7 @@ std::optional<PartsIdentification> identify_if_occluded(const Model& model,
   if (occluded <= model.parts->calibration[first].foreign_share || occluded > tuning.most_occluded)
     return std::nullopt;
   PartsIdentification found = votes.identify_occluded();
-  if (votes.gain_of_masking(found.best) < tuning.least_masking_gain) return std::nullopt;
+  if (found.masking_gain < tuning.least_masking_gain) return std::nullopt;
   return found;
 }
 
@@ -100,7 +102,7 @@ std::size_t PartsStage::judge(std::span<const float> picture, std::size_t neares
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   const PartsRecognizer::Look look = recognizer_.look(picture_);
   const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), nearest);
-  const WholeCandidate candidate = candidate_at(aligned.front(), match_, {picture, {}}, nearest);
+  const WholeCandidate candidate = candidate_at(aligned.front(), look, match_, {picture, {}}, nearest);
   return settle(look, aligned, candidate, outcome) ? nearest : vote(look, picture, candidate, outcome);
 }
 
@@ -111,18 +113,20 @@ bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const Align
   Finding finding;
   finding.object = object;
   finding.distance = nearest.distance;
-  finding.evidence = {.best = evidence_of(decision.weights, whole_match(model_, object, finding.distance)),
+  finding.evidence = {.best = evidence_of(decision.weights, whole_match(model_, nearest)),
                       .required = decision.required};
   if (finding.evidence.best < decision.settled) return false;
   if (const auto& other = finding.distance.other)
-    finding.evidence.second = evidence_of(
-        decision.weights, WholeMatch{other->distance, model_.objects[other->manifold].typical_distance});
+    finding.evidence.second =
+        evidence_of(decision.weights, WholeMatch{.distance = other->distance,
+                                                 .typical = model_.objects[other->manifold].typical_distance,
+                                                 .color = look.color_match(other->manifold)});
   if (finding.evidence.second > finding.evidence.best - decision.tuning.settled_lead) return false;
   poses_.clear();
   bool clear = true;
   for (const AlignedPose& found : aligned) {
-    PartsPose pose{
-        found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0, 0.0, 0.0};
+    PartsPose pose{found.q, found.q_covariance, found.misalignment, 0.5 * (found.cost + found.fine_cost), 0.0,
+                   0.0};
     pose.merit = -0.5 * pose.cost / model_.parts->noise;
     if (!poses_.empty() && apart(object, pose.q, poses_.front().q))
       clear = clear && pose.merit < poses_.front().merit - decision.tuning.settled_pose_lead;
@@ -145,10 +149,11 @@ std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const 
   const PartsRecognizer::Votes votes = look.vote();
   const WholeCandidates candidates = compare_whole(model_, look, votes, match_, {picture, {}}, nearest);
   const WholeCandidate& best = candidates.front();
-  if (best.evidence < model_.decision.required) {
+  const DecisionModel& decision = model_.decision;
+  if (best.evidence < decision.required) {
     const auto found = identify_if_occluded(model_, votes);
-    if (found && found->evidence > best.evidence) {
-      describe_occluded(*found, picture, model_.decision.required, outcome);
+    if (found && found->evidence - decision.required_occluded > best.evidence - decision.required) {
+      describe_occluded(*found, picture, decision.required_occluded, outcome);
       return found->best.object;
     }
   }
@@ -158,7 +163,7 @@ std::size_t PartsStage::vote(const PartsRecognizer::Look& look, std::span<const 
   finding.poses = answer.poses;
   finding.distance = best.distance;
   finding.occluded = answer.occluded;
-  finding.evidence = {.best = best.evidence, .required = model_.decision.required};
+  finding.evidence = {.best = best.evidence, .required = decision.required};
   if (candidates.full()) finding.evidence.second = best.evidence - lead_of(model_, best, candidates[1]);
   describe(finding, outcome);
   if (candidates.full()) {

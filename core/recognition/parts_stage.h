@@ -28,8 +28,9 @@ struct WholeCandidate {
   PoseVector q;               ///< its best pose
   Misalignment misalignment;  ///< of that pose
   RealignedDistance distance;
-  WindowsMatch windows;   ///< once the windows have voted
-  double evidence = 0.0;  ///< likewise
+  std::optional<ColorMatch> color;  ///< where views have colours
+  WindowsMatch windows;             ///< once the windows have voted
+  double evidence = 0.0;            ///< likewise
 };
 
 /// The one or two candidates of a region, the more likely first.
@@ -117,7 +118,11 @@ double lead_of(const Model& model, const WholeCandidate& first, const WholeCandi
 std::optional<PartsIdentification> identify_if_occluded(const Model& model,
                                                         const PartsRecognizer::Votes& votes);
 
-/// What the decision weighs of a distance.
-WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDistance& distance);
+/// What the decision weighs of a distance, and of colours.
+WholeMatch whole_match(const Model& model, std::size_t object, const RealignedDistance& distance,
+                       const std::optional<ColorMatch>& color);
+inline WholeMatch whole_match(const Model& model, const WholeCandidate& candidate) {
+  return whole_match(model, candidate.object, candidate.distance, candidate.color);
+}
 
 }  // namespace eigenpose

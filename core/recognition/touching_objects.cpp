@@ -192,7 +192,7 @@ std::vector<TouchingObjects::Trial> TouchingObjects::trials(const cv::Rect& outl
 }
 
 TouchingObject TouchingObjects::settle(const cv::Rect& box, std::span<const std::size_t> shortlist) {
-  TouchingObject object{box, {}, {}, decision_.required};
+  TouchingObject object{box, {}, {}, decision_.required_occluded};
   const auto seen = look(box, object.picture);
   if (!seen) return object;
   object.found = seen->vote(shortlist).identify_occluded();
@@ -236,7 +236,7 @@ std::vector<TouchingObject> TouchingObjects::candidates(std::span<const Trial> t
       object = std::move(again);
   }
   std::erase_if(found, [&](const TouchingObject& object) {
-    return object.found.evidence < decision_.required - search_slack;
+    return object.found.evidence < decision_.required_occluded - search_slack;
   });
   std::ranges::sort(found, by_evidence);
   keep_different(found);
@@ -325,7 +325,7 @@ void TouchingObjects::match_again(const cv::Mat& cut) {
 void TouchingObjects::accept(double explained) {
   std::vector<TouchingObject>& objects = result_.objects;
   const auto require = [&](auto slack_of) {
-    for (TouchingObject& object : objects) object.required = decision_.required - slack_of(object);
+    for (TouchingObject& object : objects) object.required = decision_.required_occluded - slack_of(object);
   };
   const auto sure = [](const TouchingObject& object) {
     return object.found.best.occluded <= most_overlapped && object.found.evidence >= object.required;

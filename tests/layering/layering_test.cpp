@@ -23,9 +23,9 @@ const fs::path source_root = EIGENPOSE_SOURCE_DIR;
 
 /// The rooms of the library, lowest first. Each may include those before it.
 const std::vector<std::string> core_rooms = {
-    "core/base",        "core/simd",     "core/image",      "core/dataset", "core/subspace",
-    "core/manifold",    "core/search",   "core/alignment",  "core/windows", "core/model",
-    "core/recognition", "core/learning", "core/evaluation", "core/example"};
+    "core/base",     "core/simd",        "core/image",     "core/dataset",    "core/subspace",
+    "core/manifold", "core/search",      "core/alignment", "core/windows",    "core/color",
+    "core/model",    "core/recognition", "core/learning",  "core/evaluation", "core/example"};
 
 /// Room outside core → rooms it may include. Every room may include its own.
 const std::map<std::string, std::set<std::string>> outer_licences = {

@@ -62,6 +62,9 @@ struct ShownProbes {
 /// Votes for one object of its own views, with learned views at least 0, 1 and 2 steps away.
 struct VotesOfViews {
   std::vector<std::array<double, 3>> votes;
+  /// Distances of the colours, of views displaced a little: to all learned views, and to the others. Empty
+  /// where views are grey.
+  std::vector<std::array<double, 2>> colors;
   double foreign = 0.0;  ///< largest share of foreign windows, one step away, halved
 };
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,8 +24,8 @@ constexpr double least_spread = 0.5;
 /// Views of one object are correlated: however many there are, they weigh as much as so many independent
 /// ones.
 constexpr double views_that_differ = 5.0;
-/// Shares of the false acceptances that may be settled by the whole region alone, and that may be taken for
-/// occluded objects.
+/// Shares of the false acceptances of regions that are visible as a whole: may be settled by the whole region
+/// alone, and may be taken for occluded objects.
 constexpr double settled_share = 0.1;
 constexpr double occluded_share = 0.3;
 /// What unknown probes of few objects are worth.
@@ -81,8 +82,8 @@ std::array<double, n> fit(const Probes& probes, const std::array<double, n>& pri
   return result;
 }
 
-EvidenceWeights fit_weights(const Probes& probes, double objects) {
-  const EvidenceWeights prior = prior_weights();
+/// @param prior of views of the same kind.
+EvidenceWeights fit_weights(const Probes& probes, const EvidenceWeights& prior, double objects) {
   EvidenceWeights weights;
   weights.whole = fit(probes, prior.whole, objects, [](const Probe& probe) {
     return probe.hidden ? std::nullopt : std::optional(whole_terms(probe.whole));
@@ -140,12 +141,71 @@ std::vector<double> sorted_evidence(const Probes& probes, const auto& wanted, co
   return evidence;
 }
 
+/// The evidence of one unknown region for the object it is taken for.
+struct UnknownEvidence {
+  double evidence = 0.0;
+  std::size_t object = 0;
+  std::size_t taken_for = 0;
+};
+
+/// In rising order.
+using UnknownSample = std::vector<UnknownEvidence>;
+
+/// @param judged of a probe: its evidence, and the object that it is for.
+UnknownSample unknown_sample(const Probes& probes, const auto& wanted, const auto& judged) {
+  UnknownSample sample;
+  for (const Probe* probe : probes)
+    if (wanted(*probe)) {
+      const auto [evidence, taken_for] = judged(*probe);
+      sample.push_back({evidence, probe->object, taken_for});
+    }
+  std::ranges::sort(sample, {}, &UnknownEvidence::evidence);
+  return sample;
+}
+
+std::vector<double> evidence_without(const UnknownSample& unknown, std::optional<std::size_t> object) {
+  std::vector<double> evidence;
+  for (const UnknownEvidence& one : unknown)
+    if (one.object != object && one.taken_for != object) evidence.push_back(one.evidence);
+  return evidence;
+}
+
+/// The share of the regions that is accepted where the threshold of each is what the other objects reach at
+/// the rate (leave one out).
+double accepted_of_new_objects(const UnknownSample& unknown, double rate) {
+  std::map<std::size_t, double> thresholds;
+  std::size_t accepted = 0;
+  for (const UnknownEvidence& one : unknown) {
+    auto [at, fresh] = thresholds.try_emplace(one.object, infinity);
+    if (fresh) {
+      const std::vector<double> others = evidence_without(unknown, one.object);
+      if (!others.empty()) at->second = upper_tail(others, rate);
+    }
+    if (one.evidence >= at->second) ++accepted;
+  }
+  return static_cast<double>(accepted) / static_cast<double>(unknown.size());
+}
+
+/// The rate to set among objects that were learned so that it holds for one that was not: a few objects cause
+/// most false acceptances, and the worst is not among those that were seen.
+double rate_for_new_objects(const UnknownSample& unknown, double rate) {
+  if (unknown.empty() || accepted_of_new_objects(unknown, rate) <= rate) return rate;
+  constexpr int halvings = 8;
+  double holds = std::log(rate / 32.0);
+  double fails = std::log(rate);
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (holds + fails);
+    (accepted_of_new_objects(unknown, std::exp(middle)) <= rate ? holds : fails) = middle;
+  }
+  return std::exp(holds);
+}
+
 /// The evidence that unknown regions reach at the rate, by what was seen of them, and by what log-odds mean.
-double accepted_at(const std::vector<double>& unknown, double rate, std::size_t objects,
+double accepted_at(const UnknownSample& unknown, double rate, std::size_t objects,
                    const FewObjects& few = few_visible) {
   const double by_odds = -few.share * std::log(rate);
   if (unknown.empty()) return by_odds;
-  const double seen = upper_tail(unknown, rate);
+  const double seen = upper_tail(evidence_without(unknown, std::nullopt), rate);
   if (objects >= few.enough) return seen;
   const double trust = static_cast<double>(objects) / static_cast<double>(few.enough);
   return trust * seen + (1.0 - trust) * by_odds;
@@ -156,9 +216,11 @@ void set_settled(const Probes& probes, std::size_t objects, DecisionModel& decis
     return [known](const Probe& probe) { return probe.known == known && !probe.hidden; };
   };
   const auto whole = [&](const Probe& probe) { return evidence_of(decision.weights, probe.whole); };
-  const std::vector<double> unknown = sorted_evidence(probes, visible(false), whole);
+  const UnknownSample unknown = unknown_sample(
+      probes, visible(false), [&](const Probe& probe) { return std::pair(whole(probe), probe.taken_for); });
   const std::vector<double> known = sorted_evidence(probes, visible(true), whole);
-  decision.settled = accepted_at(unknown, settled_share * decision.set.false_acceptance, objects);
+  decision.settled = accepted_at(
+      unknown, rate_for_new_objects(unknown, settled_share * decision.set.false_acceptance), objects);
   if (!known.empty())
     decision.settled =
         std::max(decision.settled, lower_tail(known, left_to_windows * decision.set.false_rejection));
@@ -178,28 +240,30 @@ void leave_out_twins(const DecisionModel& decision, Probes& probes) {
   });
 }
 
-/// The offset of the evidence for occluded objects with which unknown regions, hidden in part or not, reach
-/// `required` at their share of the rate.
+/// The evidence that unknown regions reach as occluded objects at the rate where a part is hidden, and at
+/// their share of it where nothing is.
 void set_occlusion(const Probes& probes, std::size_t objects, DecisionModel& decision) {
-  const double rate = occluded_share * decision.set.false_acceptance;
   double least = -infinity;
   for (const bool hidden : {false, true}) {
-    std::vector<double> evidence;
-    std::size_t shown = 0;
-    for (const Probe* probe : probes) {
-      if (probe->known || probe->hidden != hidden || !(probe->windows || probe->hidden)) continue;
-      ++shown;
-      if (probe->occluded) evidence.push_back(evidence_of(decision.weights, probe->occluded->match));
-    }
-    std::ranges::sort(evidence);
+    const double rate = (hidden ? 1.0 : occluded_share) * decision.set.false_acceptance;
+    const auto of_kind = [hidden](const Probe& probe) {
+      return !probe.known && probe.hidden == hidden && (probe.windows || probe.hidden);
+    };
+    const auto shown = std::ranges::count_if(probes, [&](const Probe* probe) { return of_kind(*probe); });
+    const UnknownSample evidence = unknown_sample(
+        probes, [&](const Probe& probe) { return of_kind(probe) && probe.occluded; },
+        [&](const Probe& probe) {
+          return std::pair(evidence_of(decision.weights, probe.occluded->match), probe.occluded->taken_for);
+        });
     // Regions that are not taken for occluded ones are not accepted as such: of the others, a larger share
     // may be.
     const double share = shown == 0 ? 1.0 : static_cast<double>(evidence.size()) / static_cast<double>(shown);
     if (shown == 0 || rate < share)
       least = std::max(least, accepted_at(evidence, rate / share, objects, few_occluded));
   }
-  if (!std::isfinite(least)) least = accepted_at({}, rate, objects, few_occluded);
-  decision.weights.occluded[0] += decision.required - least;
+  if (!std::isfinite(least))
+    least = accepted_at({}, occluded_share * decision.set.false_acceptance, objects, few_occluded);
+  decision.required_occluded = least;
 }
 
 /// Both thresholds, and the rates they hold. @param windows whether any probe was shown to windows: then the
@@ -210,10 +274,13 @@ void set_required(const Probes& probes, bool windows, std::size_t objects, Decis
         [windows, known](const Probe& p) { return p.known == known && !p.hidden && (!windows || p.windows); };
   };
   const auto visible = [&](const Probe& probe) { return visible_evidence(decision, probe); };
-  const std::vector<double> unknown = sorted_evidence(probes, shown(false), visible);
+  const UnknownSample unknown = unknown_sample(probes, shown(false), [&](const Probe& probe) {
+    return std::pair(visible(probe), probe.windows ? probe.windows->taken_for : probe.taken_for);
+  });
   decision.known = sorted_evidence(probes, shown(true), visible);
   const double left = windows ? 1.0 - occluded_share : 1.0;
-  decision.required = accepted_at(unknown, left * decision.set.false_acceptance, objects);
+  decision.required =
+      accepted_at(unknown, rate_for_new_objects(unknown, left * decision.set.false_acceptance), objects);
   decision.held_for_acceptance = true;
   if (!decision.known.empty()) {
     const double held_for_rejection = lower_tail(decision.known, decision.set.false_rejection);
@@ -224,18 +291,23 @@ void set_required(const Probes& probes, bool windows, std::size_t objects, Decis
   decision.settled = std::max(decision.settled, decision.required);
   decision.unknown = sorted_evidence(probes, shown(false), [&](const Probe& probe) {
     const double evidence = visible(probe);
-    return probe.occluded ? std::max(evidence, evidence_of(decision.weights, probe.occluded->match))
-                          : evidence;
+    if (!probe.occluded) return evidence;
+    const double beyond = evidence_of(decision.weights, probe.occluded->match) - decision.required_occluded;
+    return std::max(evidence, decision.required + beyond);
   });
   decision.expected = rates_at(decision, decision.required);
 }
 
 }  // namespace
 
-EvidenceWeights prior_weights() {
-  return {{-5.4, -7.1, 3.3},
-          {-11.0, -6.7, 3.3, -3.0, 3.4, -4.3, 2.7, -3.5},
-          {0.0, 2.7, -3.4, 1.9, -2.1, 9.7, 2.6, -7.3, -14.0}};
+EvidenceWeights prior_weights(ViewColors colors) {
+  if (colors == ViewColors::none)
+    return {{-5.4, -7.1, 3.3, 0.0, 0.0},
+            {-11.0, -6.7, 3.3, -3.0, 3.4, -4.3, 2.7, -3.5, 0.0, 0.0},
+            {0.0, 2.7, -3.4, 1.9, -2.1, 9.7, 2.6, -7.3, -14.0, 0.0, 0.0}};
+  return {{0.0, -4.7, 4.0, -6.9, 5.3},
+          {-4.0, -3.8, 2.5, -1.8, -1.7, -2.8, 4.7, -2.5, -5.9, 4.5},
+          {-7.0, 6.1, -4.6, -0.2, -1.9, 14.8, 4.9, -4.1, -18.0, -2.7, 0.5}};
 }
 
 void check_rates(const DecisionRates& rates) {
@@ -252,7 +324,9 @@ DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRa
   Probes used;
   std::set<std::size_t> objects;
   bool windows = false;
+  ViewColors colors = ViewColors::none;
   for (const Probe& probe : probes) {
+    if (probe.whole.color) colors = ViewColors::some;
     const bool of_it = probe.object == without || probe.taken_for == without ||
                        (probe.windows && probe.windows->taken_for == without) ||
                        (probe.occluded && probe.occluded->taken_for == without);
@@ -263,9 +337,9 @@ DecisionModel calibrate_decision(std::span<const Probe> probes, const DecisionRa
   }
   DecisionModel decision;
   decision.set = {std::max(rates.false_rejection, least_rate), std::max(rates.false_acceptance, least_rate)};
-  decision.weights = prior_weights();
+  decision.weights = prior_weights(colors);
   leave_out_twins(decision, used);
-  decision.weights = fit_weights(used, static_cast<double>(objects.size()));
+  decision.weights = fit_weights(used, decision.weights, static_cast<double>(objects.size()));
   set_settled(used, objects.size(), decision);
   set_required(used, windows, objects.size(), decision);
   decision.set = rates;

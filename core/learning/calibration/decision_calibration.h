@@ -9,8 +9,10 @@
 /// evidence of unknown probes above which that of false acceptances does. Both are quantiles of the sample,
 /// and beyond its lowest (highest) twentieth of an exponential tail, as a few hundred probes do not show one
 /// in a thousand. Where both rates can be held, the threshold is the one of false rejections. Where not, that
-/// of false acceptances wins: a wrong name is worse than none. A log-odds bounds the rate of false
-/// acceptances by itself, P(Λ > t | unknown) ≤ e^−t; a share of that t decides where there are few objects.
+/// of false acceptances wins: a wrong name is worse than none. It is held for objects that were not learned:
+/// the threshold is such that each object, judged by a threshold from the probes of the others, is accepted
+/// at the rate. A log-odds bounds the rate of false acceptances by itself, P(Λ > t | unknown) ≤ e^−t; a share
+/// of that t decides where there are few objects.
 
 #include <optional>
 #include <span>
@@ -20,8 +22,11 @@
 
 namespace eigenpose {
 
+/// What views show beside brightness.
+enum class ViewColors { none, some };
+
 /// The weights before any view was seen. Measured: core/recognition/README.md, "Constants".
-EvidenceWeights prior_weights();
+EvidenceWeights prior_weights(ViewColors colors);
 
 /// @throws std::invalid_argument for rates out of range: 0…0.5 of false rejections, 0…1 of false acceptances.
 void check_rates(const DecisionRates& rates);

@@ -83,6 +83,15 @@ std::optional<OccludedProbe> Prober::match_occluded(const PartsRecognizer::Votes
 void Prober::show_known(const View& view, ShownProbes& shown) {
   Probe probe{view.object, view.object, true};
   probe.whole = known_match(model_, yardsticks_, view.object, view.view);
+  const auto own_view = static_cast<int>(view.view);
+  const auto between = [&](double a, double b) { return a + yardsticks_.half_step * (b - a); };
+  if (recognizer_) {
+    const cv::Mat picture = perturbed(view);
+    const PartsRecognizer::Look look = recognizer_->look(picture);
+    probe.whole.color = look.color_match(view.object);
+    if (auto& color = probe.whole.color)
+      color->distance = between(color->distance, look.color_match(view.object, {&own_view, 1})->distance);
+  }
   if (view.windows) {
     const cv::Mat picture = perturbed(view);
     shown_.show(picture);
@@ -90,9 +99,7 @@ void Prober::show_known(const View& view, ShownProbes& shown) {
     const PartsRecognizer::Votes all = look.vote();
     const WindowsMatch present = all.match(view.object);
     add_rivals(all, shown);
-    const auto own_view = static_cast<int>(view.view);
     const WindowsMatch left_out = all.without(view.object, {&own_view, 1}).match(view.object);
-    const auto between = [&](double a, double b) { return a + yardsticks_.half_step * (b - a); };
     WindowsMatch expected = present;
     expected.votes = between(present.votes, left_out.votes);
     expected.discriminating = between(present.discriminating, left_out.discriminating);
@@ -116,17 +123,19 @@ void Prober::show_unknown(const View& view, ShownProbes& shown) {
   shown.rivals.push_back(*nearest);
   Probe probe{view.object, *nearest, false};
   if (!view.windows) {
-    probe.whole = whole_match(model_, *nearest, shown_.distance(*nearest, view.object));
+    std::optional<ColorMatch> color;
+    if (recognizer_) color = recognizer_->look(picture).color_match(*nearest);
+    probe.whole = whole_match(model_, *nearest, shown_.distance(*nearest, view.object), color);
   } else {
     const PartsRecognizer::Look look = recognizer_->look(picture);
     const WholeRegion region{shown_.numbers(), view.object};
     const WholeCandidate aligned = align_whole(look, shown_.aligned_match(), region, *nearest);
-    probe.whole = whole_match(model_, *nearest, aligned.distance);
+    probe.whole = whole_match(model_, aligned);
     const PartsRecognizer::Votes votes = look.vote().without(view.object, all_views(view.object));
     add_rivals(votes, shown);
     const WholeCandidate best =
         compare_whole(model_, look, votes, shown_.aligned_match(), region, aligned).front();
-    probe.windows = {best.object, whole_match(model_, best.object, best.distance), best.windows};
+    probe.windows = {best.object, whole_match(model_, best), best.windows};
     probe.occluded = match_occluded(votes);
   }
   shown.probes.push_back(probe);
@@ -171,19 +180,27 @@ ShownProbes Prober::show(const View& view) {
   return shown;
 }
 
+void update_yardsticks(const Model& model, std::size_t object, WholeMatch& match) {
+  match.typical = model.objects[object].typical_distance;
+  if (match.color) match.color->typical = model.parts->calibration[object].typical_color;
+}
+
 /// Probes as they were, with the yardsticks as they are.
 ShownProbes brought_up_to_date(const Model& model, const Yardsticks& yardsticks, ShownProbes shown) {
   for (Probe& probe : shown.probes) {
-    probe.whole.typical = model.objects[probe.taken_for].typical_distance;
+    update_yardsticks(model, probe.taken_for, probe.whole);
     if (probe.known && !probe.hidden)
       probe.whole.distance = known_match(model, yardsticks, shown.object, shown.view).distance;
-    if (probe.occluded)
-      probe.occluded->match.windows.typical_votes =
-          model.parts->calibration[probe.occluded->taken_for].typical_votes;
+    if (probe.occluded) {
+      const PartsCalibration& calibration = model.parts->calibration[probe.occluded->taken_for];
+      OccludedMatch& match = probe.occluded->match;
+      match.windows.typical_votes = calibration.typical_votes;
+      if (match.color) match.color->typical = calibration.typical_color;
+    }
     if (!probe.windows) continue;
     const std::size_t taken_for = probe.windows->taken_for;
     if (probe.known) probe.windows->whole = probe.whole;
-    probe.windows->whole.typical = model.objects[taken_for].typical_distance;
+    update_yardsticks(model, taken_for, probe.windows->whole);
     probe.windows->windows.typical_votes = model.parts->calibration[taken_for].typical_votes;
   }
   return shown;

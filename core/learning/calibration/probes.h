@@ -28,7 +28,7 @@ namespace eigenpose {
 
 struct ProbeOptions {
   std::size_t shown = 400;    ///< views shown to the windows, of all objects together
-  std::size_t hidden = 150;   ///< of these, views shown with a part hidden
+  std::size_t hidden = 250;   ///< of these, views shown with a part hidden
   double hidden_share = 0.2;  ///< of the picture
   unsigned threads = 0;
   /// What was shown before: see show_views. Empty: nothing.

@@ -58,6 +58,14 @@ std::vector<ViewDistance> measure_object(const Measured& all, std::size_t o, Obj
   return result;
 }
 
+/// Distances of the colours of one view, as a map of its picture, to all views and to the others.
+std::array<double, 2> color_distances(const ColorViews& colors, const ChromaticityMap& map,
+                                      std::size_t view) {
+  const ChromaticityRoots roots = chromaticity_roots(map);
+  const auto own = static_cast<int>(view);
+  return {colors.distance(roots), colors.distance(roots, {&own, 1})};
+}
+
 VotesOfViews vote_for_own_views(const PartsModel& model, const TrainingViews& views, std::size_t o,
                                 const YardstickOptions& options, std::size_t stride) {
   const ObjectViews& object = views.objects()[o];
@@ -72,7 +80,11 @@ VotesOfViews vote_for_own_views(const PartsModel& model, const TrainingViews& vi
   std::vector<float> background;
   VotesOfViews result;
   for (std::size_t v = 0; v < object.count; v += stride) {
-    mapper.compute(displaced(views.picture(object.first + v), options.residual.of(object.object, v)), map);
+    const cv::Mat picture = displaced(views.picture(object.first + v), options.residual.of(object.object, v));
+    if (!model.colors.empty())
+      result.colors.push_back(
+          color_distances(model.colors[o], chromaticity_map(picture, model.background), v));
+    mapper.compute(picture, map);
     make_query_windows(map, model.space, model.scale, model.voting, windows);
     matcher.match(windows, shortlist);
     matcher.plain_votes(0, votes);
@@ -123,16 +135,20 @@ void measure_windows(const PartsModel& parts, const TrainingViews& views, const 
   parallel_for(objects.size(), options.threads, [&](std::size_t o) {
     meter.check_stop();
     const std::size_t voting = (views.objects()[o].count + stride - 1) / stride;
-    if (objects[o].votes.votes.size() != voting)
+    if (objects[o].votes.votes.size() != voting ||
+        (!parts.colors.empty() && objects[o].votes.colors.size() != voting))
       objects[o].votes = vote_for_own_views(parts, views, o, options, stride);
   });
   yardsticks.half_step = half_step_share(objects);
   for (const ObjectRecord& own : objects) {
-    std::vector<double> expected;
-    for (const auto& votes : own.votes.votes)
-      expected.push_back(votes[0] + yardsticks.half_step * (votes[1] - votes[0]));
-    yardsticks.windows.push_back(
-        {mean(expected), std::clamp(own.votes.foreign, least_foreign_share, most_foreign_share)});
+    const auto expected = [&](const auto& measured) {
+      std::vector<double> halfway;
+      for (const auto& one : measured) halfway.push_back(one[0] + yardsticks.half_step * (one[1] - one[0]));
+      return halfway.empty() ? 0.0 : mean(halfway);
+    };
+    yardsticks.windows.push_back({expected(own.votes.votes),
+                                  std::clamp(own.votes.foreign, least_foreign_share, most_foreign_share),
+                                  expected(own.votes.colors)});
   }
 }
 

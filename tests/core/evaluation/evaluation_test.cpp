@@ -122,6 +122,7 @@ std::shared_ptr<const Model> model_without(const Model& whole, std::size_t o,
   parts.calibration.clear();
   parts.view_poses.clear();
   parts.extents.clear();
+  parts.colors.clear();
   for (std::size_t k = 0; k < whole.objects.size(); ++k) {
     if (k == o) continue;
     rest->objects.push_back(whole.objects[k]);
@@ -130,6 +131,7 @@ std::shared_ptr<const Model> model_without(const Model& whole, std::size_t o,
     parts.calibration.push_back(whole.parts->calibration[k]);
     parts.view_poses.push_back(whole.parts->view_poses[k]);
     parts.extents.push_back(whole.parts->extents[k]);
+    parts.colors.push_back(whole.parts->colors[k]);
   }
   rest->parts = std::make_shared<const PartsModel>(std::move(parts));
   return rest;

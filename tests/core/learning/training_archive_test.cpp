@@ -227,8 +227,8 @@ TEST_F(TrainingArchiveTest, RefusesOneFlippedByteAnywhereAndAFileCutOff) {
   }
   auto other = bytes;
   const std::string text(other.begin(), other.begin() + 100);
-  for (const char version : {'0', '1', '7'}) {
-    other[text.find("version 2") + 8] = static_cast<unsigned char>(version);
+  for (const char version : {'0', '1', '2', '7'}) {
+    other[text.find("version 3") + 8] = static_cast<unsigned char>(version);
     put(other);
     EXPECT_THAT(refusal("kept"),
                 AllOf(HasSubstr(std::string("version ") + version), HasSubstr("--keep-views")));

@@ -20,6 +20,16 @@ TEST(DecisionModel, ADistanceHasTheEvidenceItWasAskedFor) {
   EXPECT_TRUE(std::isinf(decision.distance_of(0.0, 0.02)));
 }
 
+TEST(DecisionModel, ADistanceIsThatOfARegionWithUsualColours) {
+  DecisionModel decision;
+  decision.weights.whole = {-5.0, -7.0, 3.0, -6.0, 5.0};
+  for (const double color : {0.1, 1e-9}) {
+    const double distance = decision.distance_of(1.0, 0.02, color);
+    const double h = std::log(std::max(color, least_color_distance));
+    EXPECT_NEAR(-5.0 - 7.0 * std::log(distance) + 3.0 * std::log(0.02) - 6.0 * h + 5.0 * h, 1.0, 1e-9);
+  }
+}
+
 TEST(DecisionModel, BothRatesFollowTheThreshold) {
   DecisionModel decision;
   decision.known = {1.0, 2.0, 3.0, 4.0};

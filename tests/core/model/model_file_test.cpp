@@ -58,6 +58,7 @@ TEST_F(ModelFile, GivesBackEverythingBitForBit) {
   EXPECT_EQ(after.provenance.solver, before.provenance.solver);
   EXPECT_EQ(after.decision.weights, before.decision.weights);
   EXPECT_EQ(after.decision.required, before.decision.required);
+  EXPECT_EQ(after.decision.required_occluded, before.decision.required_occluded);
   EXPECT_EQ(after.decision.settled, before.decision.settled);
   EXPECT_EQ(after.decision.held_for_acceptance, before.decision.held_for_acceptance);
   EXPECT_EQ(after.decision.set, before.decision.set);
@@ -132,7 +133,7 @@ TEST_F(ModelFile, RefusesAFileCutOffOrContinuedAnywhere) {
 TEST_F(ModelFile, IsTruncatedWhereverItsSealIsCut) {
   const auto bytes = read_file(file());
   const std::string start(bytes.begin(), bytes.begin() + 64);
-  const std::size_t version_end = start.find("version 4") + 9;
+  const std::size_t version_end = start.find("version 5") + 9;
   for (std::size_t size = version_end; size < seal_size; ++size) {
     write({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)});
     EXPECT_THAT(refusal(), HasSubstr("truncated")) << size;
@@ -157,13 +158,13 @@ TEST_F(ModelFile, KeepsWhereItCameFrom) {
 TEST_F(ModelFile, SaysWhatToDoAboutAnotherVersion) {
   auto bytes = read_file(file());
   const std::string text(bytes.begin(), bytes.begin() + 100);
-  const auto at = text.find("version 4");
+  const auto at = text.find("version 5");
   ASSERT_NE(at, std::string::npos);
-  for (const char version : {'1', '2', '3', '9'}) {
+  for (const char version : {'1', '2', '3', '4', '9'}) {
     bytes[at + 8] = static_cast<unsigned char>(version);
     write(bytes);
     EXPECT_THAT(refusal(), HasSubstr(std::string("is of version ") + version +
-                                     ", this program reads version 4; learn it again"));
+                                     ", this program reads version 5; learn it again"));
   }
 }
 
@@ -198,7 +199,7 @@ TEST_F(ModelFile, RefusesValuesThatCannotBeThoughTheSealIsGood) {
     std::memcpy(bytes.data() + at, &value, sizeof value);
     AtomicFile sealed(file());
     sealed.write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    seal_file({"eigenpose model\n", 4, "", ""}, sealed);
+    seal_file({"eigenpose model\n", 5, "", ""}, sealed);
     sealed.commit();
     return refusal();
   };
@@ -240,6 +241,8 @@ TEST(ModelCheck, NamesWhatIsWrong) {
       {"the weights of occluded regions are not finite",
        [&](Model& m) { m.decision.weights.occluded[0] = nan; }},
       {"the required evidence is nan", [&](Model& m) { m.decision.required = nan; }},
+      {"the required evidence of occluded regions is nan",
+       [&](Model& m) { m.decision.required_occluded = nan; }},
       {"the evidence that settles is", [&](Model& m) { m.decision.settled = m.decision.required - 1.0; }},
       {"the set rate of false rejections is 2", [&](Model& m) { m.decision.set.false_rejection = 2.0; }},
       {"the expected rate of false acceptances is -1",

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -109,6 +110,35 @@ TEST(PartsFile, KeepsLanesOfMoreCandidatesThanSixteenBitsCount) {
   EXPECT_EQ(read_back(model).parts->objects[0].lane_candidate.back(), 69'999U);
 }
 
+/// With colours as if its grey views had some.
+void color(PartsModel& parts) {
+  parts.bands = 3;
+  parts.space =
+      WindowSpace::from_parts(Eigen::VectorXf::Zero(window_length(3)),
+                              Eigen::MatrixXf::Identity(window_length(3), parts.space.basis().cols()), 1.0F);
+  for (std::size_t o = 0; o < 3; ++o) {
+    std::vector<ChromaticityMap> maps(12);
+    for (std::size_t v = 0; v < maps.size(); ++v) {
+      maps[v].u.fill(static_cast<std::uint8_t>(10 * o + v));
+      maps[v].v.fill(static_cast<std::uint8_t>(100 + v));
+      maps[v].brightness[v] = 255;
+    }
+    parts.colors.emplace_back(std::move(maps));
+    parts.calibration[o].typical_color = 0.1 * static_cast<double>(o);
+  }
+}
+
+TEST(PartsFile, KeepsTheColoursOfTheViews) {
+  const Model model = with_parts(color);
+  const Model read = read_back(model);
+  ASSERT_EQ(read.parts->colors.size(), 3U);
+  for (std::size_t o = 0; o < 3; ++o) {
+    EXPECT_TRUE(std::ranges::equal(read.parts->colors[o].maps(), model.parts->colors[o].maps()));
+    EXPECT_EQ(read.parts->calibration[o].typical_color, model.parts->calibration[o].typical_color);
+  }
+  EXPECT_TRUE(read_back(with_parts([](PartsModel&) {})).parts->colors.empty()) << "of grey views";
+}
+
 TEST(PartsFile, RefusesPartsThatCannotBe) {
   const double nan = std::nan("");
   struct Spoiled {
@@ -131,6 +161,22 @@ TEST(PartsFile, RefusesPartsThatCannotBe) {
        [&](PartsModel& p) { p.calibration[1].typical_votes = nan; }},
       {"the typical votes is 1.5", [](PartsModel& p) { p.calibration[0].typical_votes = 1.5; }},
       {"the share of foreign windows is -1", [](PartsModel& p) { p.calibration[2].foreign_share = -1.0; }},
+      {"the typical distance of colours is 2", [](PartsModel& p) { p.calibration[2].typical_color = 2.0; }},
+      {"the windows do not fit the objects",
+       [](PartsModel& p) {
+         color(p);
+         p.colors.pop_back();
+       }},
+      {"the windows do not fit the objects",
+       [](PartsModel& p) {
+         color(p);
+         p.bands = 1;
+       }},
+      {"object \"object1\": the colours do not fit the views",
+       [](PartsModel& p) {
+         color(p);
+         p.colors[1] = ColorViews(std::vector<ChromaticityMap>(11));
+       }},
       {"a view that was not learned", [](PartsModel& p) { p.objects[0].candidates[0].view = 12; }},
       {"the poses of views do not fit its degrees of freedom",
        [](PartsModel& p) { p.view_poses[1] = Eigen::MatrixXd::Zero(2, 12); }},

@@ -31,7 +31,7 @@ const PartsModel& model() {
 const DecisionModel& decision() {
   static const DecisionModel before = [] {
     DecisionModel made;
-    made.weights = prior_weights();
+    made.weights = prior_weights(ViewColors::none);
     return made;
   }();
   return before;
@@ -126,7 +126,7 @@ TEST(PartsRecognizer, MaskingExplainsMuchWhereSomethingOccludesAndLittleWhereNot
   cv::Mat picture = test::DrawnObject(21).view(52.0);
   const auto gain_of = [&](const cv::Mat& shown) {
     const auto votes = recognizer.look(shown).vote();
-    return votes.gain_of_masking(votes.identify_occluded().best);
+    return votes.identify_occluded().masking_gain;
   };
   EXPECT_LT(gain_of(picture), 1.0);
   picture(cv::Rect(8, 18, 28, 28)).setTo(0);

@@ -72,7 +72,7 @@ TEST(PartsStage, AsksTheWindowsWhereTheWholeRegionDoesNotSettleIt) {
 TEST(PartsStage, SettlesByTheWholeRegionAloneWithEnoughEvidence) {
   // Windows that speak against everything are not asked.
   Recognizer recognize(parts_world().deciding([](DecisionModel& decision) {
-    decision.required = decision.settled = -1e6;
+    decision.required = decision.required_occluded = decision.settled = -1e6;
     decision.tuning.settled_lead = -1e6;
     decision.weights.windows = {-1e9};
   }));

@@ -226,8 +226,9 @@ TEST(TouchingObjects, AreNotReportedWithoutEnoughEvidence) {
   const cv::Mat scene = touching(1, 55.0, 2, 120.0);
   Recognizer usual(world().model);
   ASSERT_EQ(usual.recognize(scene).size(), 2U);
-  Recognizer strict(
-      world().deciding([](DecisionModel& decision) { decision.required = decision.settled = 1e6; }));
+  Recognizer strict(world().deciding([](DecisionModel& decision) {
+    decision.required = decision.required_occluded = decision.settled = 1e6;
+  }));
   const auto outcomes = strict.recognize(scene);
   ASSERT_EQ(outcomes.size(), 1U);
   EXPECT_EQ(outcomes[0].verdict, Verdict::unknown);
@@ -235,7 +236,8 @@ TEST(TouchingObjects, AreNotReportedWithoutEnoughEvidence) {
 
 TEST(TouchingObjects, AreReportedUpToAQuarterOccludedOnly) {
   // The second stands before the first, nearer and nearer; whatever is found has enough evidence.
-  Recognizer recognize(world().deciding([](DecisionModel& decision) { decision.required = -1e6; }));
+  Recognizer recognize(world().deciding(
+      [](DecisionModel& decision) { decision.required = decision.required_occluded = -1e6; }));
   const SceneKnobs behind = PartsWorld::knobs();
   int split = 0;
   for (const double angle : {5.0, 185.0})
@@ -288,7 +290,8 @@ TEST(TouchingObjects, DoNotReplaceAKnownObjectUnlessTheyExplainItsRegion) {
   auto changed = std::make_shared<Model>(*world().changed([&](PartsModel& parts) {
     for (cv::Size& size : parts.extents[one]) size = {size.width * 2 / 3, size.height * 2 / 3};
   }));
-  changed->decision.required = -1e6;  // whatever is found has enough evidence
+  changed->decision.required = changed->decision.required_occluded =
+      -1e6;  // whatever is found has enough evidence
   Recognizer recognize(changed);
   for (double angle = 5.0; angle < 360.0; angle += 60.0) {
     const auto outcomes = recognize.recognize(testing::scene_with(1, angle, PartsWorld::knobs()));
