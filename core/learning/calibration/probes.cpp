@@ -52,6 +52,16 @@ class Prober {
     return displaced(learned(view), yardsticks_.perturbation.of(name_of(view), view.view));
   }
   void show_known(const View& view, ShownProbes& shown);
+  /// Its windows: sets what `probe` has of them.
+  void show_known_windows(const View& view, const cv::Mat& picture, const PartsRecognizer::Look& look,
+                          Probe& probe, ShownProbes& shown);
+  /// What the colours of a new view there would show.
+  [[nodiscard]] std::optional<ColorMatch> expected_colors(const PartsRecognizer::Look& look,
+                                                          const View& view) const;
+  /// Between what is seen with a view among the learned ones and without it: of a new view.
+  [[nodiscard]] double halfway(double present, double left_out) const {
+    return present + yardsticks_.half_step * (left_out - present);
+  }
   void show_unknown(const View& view, ShownProbes& shown);
   void show_hidden(const View& view, ShownProbes& shown);
   /// Notes the two objects with most votes that are not the view's own.
@@ -83,35 +93,41 @@ std::optional<OccludedProbe> Prober::match_occluded(const PartsRecognizer::Votes
 void Prober::show_known(const View& view, ShownProbes& shown) {
   Probe probe{view.object, view.object, true};
   probe.whole = known_match(model_, yardsticks_, view.object, view.view);
-  const auto own_view = static_cast<int>(view.view);
-  const auto between = [&](double a, double b) { return a + yardsticks_.half_step * (b - a); };
   if (recognizer_) {
     const cv::Mat picture = perturbed(view);
     const PartsRecognizer::Look look = recognizer_->look(picture);
-    probe.whole.color = look.color_match(view.object);
-    if (auto& color = probe.whole.color)
-      color->distance = between(color->distance, look.color_match(view.object, {&own_view, 1})->distance);
-  }
-  if (view.windows) {
-    const cv::Mat picture = perturbed(view);
-    shown_.show(picture);
-    const PartsRecognizer::Look look = recognizer_->look(picture);
-    const PartsRecognizer::Votes all = look.vote();
-    const WindowsMatch present = all.match(view.object);
-    add_rivals(all, shown);
-    const WindowsMatch left_out = all.without(view.object, {&own_view, 1}).match(view.object);
-    WindowsMatch expected = present;
-    expected.votes = between(present.votes, left_out.votes);
-    expected.discriminating = between(present.discriminating, left_out.discriminating);
-    if (present.next && left_out.next) expected.next = between(*present.next, *left_out.next);
-    const RealignedDistance distance = shown_.distance(view.object, std::nullopt);
-    if (distance.other) {
-      probe.whole.other = distance.other->distance;
-      shown.rivals.push_back(distance.other->manifold);
-    }
-    probe.windows = {view.object, probe.whole, expected};
+    probe.whole.color = expected_colors(look, view);
+    if (view.windows) show_known_windows(view, picture, look, probe, shown);
   }
   shown.probes.push_back(probe);
+}
+
+std::optional<ColorMatch> Prober::expected_colors(const PartsRecognizer::Look& look, const View& view) const {
+  std::optional<ColorMatch> color = look.color_match(view.object);
+  if (!color) return color;
+  const auto own_view = static_cast<int>(view.view);
+  color->distance = halfway(color->distance, look.color_match(view.object, {&own_view, 1})->distance);
+  return color;
+}
+
+void Prober::show_known_windows(const View& view, const cv::Mat& picture, const PartsRecognizer::Look& look,
+                                Probe& probe, ShownProbes& shown) {
+  shown_.show(picture);
+  const PartsRecognizer::Votes all = look.vote();
+  const WindowsMatch present = all.match(view.object);
+  add_rivals(all, shown);
+  const auto own_view = static_cast<int>(view.view);
+  const WindowsMatch left_out = all.without(view.object, {&own_view, 1}).match(view.object);
+  WindowsMatch expected = present;
+  expected.votes = halfway(present.votes, left_out.votes);
+  expected.discriminating = halfway(present.discriminating, left_out.discriminating);
+  if (present.next && left_out.next) expected.next = halfway(*present.next, *left_out.next);
+  const RealignedDistance distance = shown_.distance(view.object, std::nullopt);
+  if (distance.other) {
+    probe.whole.other = distance.other->distance;
+    shown.rivals.push_back(distance.other->manifold);
+  }
+  probe.windows = {view.object, probe.whole, expected};
 }
 
 void Prober::show_unknown(const View& view, ShownProbes& shown) {

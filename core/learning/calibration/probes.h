@@ -6,8 +6,9 @@
 /// show, which is half a step from a learned one, lies between what is seen with the view among the learned
 /// ones and without it. Distance: squared, d² + e/g, where d is the distance to the manifold through all
 /// views, e what the manifold of every second view misses more, and g the growth of e when the step doubles
-/// (thinned_manifolds.h). Votes: v + c·(v₁ − v), where v₁ leaves the view out, and c = ½ᵖ is the share of a
-/// whole step that half a step makes, by the power law through none, one and two steps (yardsticks.h).
+/// (thinned_manifolds.h). Votes, and distances of colours: v + c·(v₁ − v), where v₁ leaves the view out, and
+/// c = ½ᵖ is the share of a whole step that half a step makes, by the power law through none, one and two
+/// steps (yardsticks.h).
 ///
 /// **Unknown.** The same view, with its object taken out of everything it is compared with.
 ///
