@@ -11,6 +11,7 @@
 #include "core/learning/parts_learning.h"
 #include "core/recognition/decision.h"
 #include "tests/support/drawn_pictures.h"
+#include "tests/support/parts_world.h"
 
 namespace eigenpose {
 namespace {
@@ -155,6 +156,28 @@ TEST(PartsRecognizer, VotesAsIfViewsOrAnObjectHadNotBeenLearned) {
   EXPECT_EQ(without.match(2).votes, 0.0);
   EXPECT_EQ(without.ranked().back().object, 2U);
   EXPECT_EQ(look.vote().match(2).votes, present) << "what was excluded is back";
+}
+
+TEST(PartsRecognizer, ComparesColoursWithThoseOfTheViewsButTheOnesLeftOut) {
+  const auto& world = testing::parts_world();
+  const PartsModel& parts = *world.model->parts;
+  PartsRecognizer recognizer(parts, world.model->decision);
+  for (const int side : {64, 128}) {
+    cv::Mat picture(side, side, CV_8UC3, cv::Scalar(30, 120, 160));
+    picture.rowRange(0, side / 2).setTo(cv::Scalar(160, 60, 30));
+    const auto look = recognizer.look(picture);
+    const ChromaticityRoots roots = chromaticity_roots(chromaticity_map(picture, parts.background));
+    const std::vector<int> most{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17};
+    for (std::size_t o = 0; o < parts.objects.size(); ++o) {
+      const auto match = look.color_match(o);
+      ASSERT_TRUE(match);
+      EXPECT_EQ(match->distance, parts.colors[o].distance(roots));
+      EXPECT_EQ(match->typical, parts.calibration[o].typical_color);
+      EXPECT_EQ(look.color_match(o, most)->distance, parts.colors[o].distance(roots, most));
+    }
+  }
+  PartsRecognizer of_grey(model(), decision());
+  EXPECT_FALSE(of_grey.look(test::DrawnObject(20).view(0.0)).color_match(0));
 }
 
 TEST(PartsRecognizer, RefusesVotesOfAPictureThatIsNoLongerTheLast) {

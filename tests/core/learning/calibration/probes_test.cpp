@@ -72,6 +72,45 @@ TEST(Probes, KnownViewsLieNearerAndHaveMoreVotesThanUnknownOnes) {
   EXPECT_LT(other_votes, own_votes);
 }
 
+TEST(Probes, HaveTheColoursOfTheObjectThatTheyAreTakenFor) {
+  const auto& world = testing::parts_world();
+  const auto typical = [&](std::size_t object) {
+    return world.model->parts->calibration[object].typical_color;
+  };
+  double known = 0.0;
+  double unknown = 0.0;
+  for (const Probe& probe : world.report.probes) {
+    if (probe.occluded) {
+      ASSERT_TRUE(probe.occluded->match.color);
+      EXPECT_EQ(probe.occluded->match.color->typical, typical(probe.occluded->taken_for));
+    }
+    if (probe.hidden) continue;
+    ASSERT_TRUE(probe.whole.color);
+    EXPECT_EQ(probe.whole.color->typical, typical(probe.taken_for));
+    ASSERT_TRUE(probe.windows->whole.color);
+    EXPECT_EQ(probe.windows->whole.color->typical, typical(probe.windows->taken_for));
+    (probe.known ? known : unknown) += probe.whole.color->distance;
+  }
+  EXPECT_GT(known, 0.0);
+  EXPECT_LT(2.0 * known, unknown);
+}
+
+TEST(Probes, ExpectOfANewViewTheColoursBetweenThoseWithTheViewAndWithoutIt) {
+  const auto& world = testing::parts_world();
+  for (std::size_t o = 0; o < world.model->objects.size(); ++o) {
+    double sum = 0.0;
+    int count = 0;
+    for (const Probe& probe : world.report.probes)
+      if (probe.known && !probe.hidden && probe.object == o) {
+        sum += probe.whole.color->distance;
+        ++count;
+      }
+    const double typical = world.model->parts->calibration[o].typical_color;
+    EXPECT_GT(typical, 0.0);
+    EXPECT_NEAR(sum / count, typical, 0.5 * typical) << "displaced a little more";
+  }
+}
+
 TEST(Probes, OfAModelWithoutWindowsShowTheWholeRegionAlone) {
   const auto& report = testing::learned_world().report;
   ASSERT_FALSE(report.probes.empty());
