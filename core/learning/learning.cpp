@@ -166,7 +166,7 @@ CalibrationRecord calibrate(const Run& run, const Learned& learned, CalibrationR
   ProbeOptions probe;
   yardstick.threads = probe.threads = run.options.threads;
   // Without alignment, misalignment adds to every distance: what segmentation causes on average.
-  if (!parts) yardstick.perturbation = {.shift = 0.015, .scale = 0.03, .turn_deg = 1.5};
+  if (!parts) yardstick.perturbation = {.shift = 0.015, .scale = 0.03, .turn_deg = 1.5, .tint = usual_tint};
   yardstick.kept = kept.objects;
   Yardsticks yardsticks = measure_yardsticks(model, views, points, yardstick, run.progress, run.stop);
   for (std::size_t o = 0; o < model.objects.size(); ++o)

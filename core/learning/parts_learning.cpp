@@ -201,7 +201,7 @@ std::vector<std::vector<Eigen::MatrixXf>> project_windows(const std::vector<Part
 }  // namespace
 
 PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
-                       const Progress& progress, std::stop_token stop) {
+                       const Progress& progress, const std::stop_token& stop) {
   if (objects.empty() || objects.front().count == 0) {
     throw std::invalid_argument("learning windows needs at least one object with a view");
   }

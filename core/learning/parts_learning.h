@@ -35,6 +35,6 @@ struct PartsLearningOptions {
 /// Learns windows and alignment eigenspaces. What is calibrated comes later (calibration/).
 /// @throws std::invalid_argument without objects or views; Interrupted.
 PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
-                       const Progress& progress = {}, std::stop_token stop = {});
+                       const Progress& progress = {}, const std::stop_token& stop = {});
 
 }  // namespace eigenpose

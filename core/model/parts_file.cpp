@@ -119,7 +119,7 @@ std::vector<cv::Size> read_extents(const Eigen::MatrixXd& matrix, const PartsObj
 Eigen::MatrixXd read_view_poses(const Hdf5Group& group, const AlignmentEigenspace& pose,
                                 const PartsObject& object) {
   const auto axes = pose.coarse_manifold().axes();
-  const Eigen::MatrixXd poses = group.has("poses") ? group.read_doubles("poses") : grid_poses(axes);
+  Eigen::MatrixXd poses = group.has("poses") ? group.read_doubles("poses") : grid_poses(axes);
   const bool fits =
       std::all_of(object.candidates.begin(), object.candidates.end(),
                   [&](const Candidate& one) { return one.view >= 0 && one.view < poses.cols(); });

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace eigenpose {
@@ -19,6 +20,16 @@ Misalignment Perturbation::draw(SeededRandom& random) const {
 Misalignment Perturbation::of(std::string_view object, std::size_t view) const {
   SeededRandom random(seed_of(object, view));
   return draw(random);
+}
+
+cv::Mat perturbed(const cv::Mat& picture, const Perturbation& by, std::string_view object, std::size_t view) {
+  cv::Mat result = displaced(picture, by.of(object, view));
+  if (picture.channels() != 3 || by.tint <= 0.0) return result;
+  SeededRandom random(seed_of(object, view) ^ 0x9E3779B9U);  // not the draws of its misalignment
+  const double blue = 1.0 + by.tint * random.symmetric();
+  const double red = 1.0 + by.tint * random.symmetric();
+  cv::multiply(result, cv::Scalar(blue, 1.0, red), result);
+  return result;
 }
 
 std::uint32_t seed_of(std::string_view object, std::size_t view) {

@@ -49,7 +49,7 @@ class Prober {
     return views_.picture(views_.objects()[view.object].first + view.view);
   }
   [[nodiscard]] cv::Mat perturbed(const View& view) const {
-    return displaced(learned(view), yardsticks_.perturbation.of(name_of(view), view.view));
+    return eigenpose::perturbed(learned(view), yardsticks_.perturbation, name_of(view), view.view);
   }
   void show_known(const View& view, ShownProbes& shown);
   /// Its windows: sets what `probe` has of them.

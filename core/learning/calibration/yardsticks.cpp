@@ -47,7 +47,7 @@ std::vector<ViewDistance> measure_object(const Measured& all, std::size_t o, Obj
   std::vector<ViewDistance> result;
   const bool aligned = record.misalignments.size() == object.count;
   for (std::size_t v = 0; v < object.count; ++v) {
-    shown.show(displaced(views.picture(object.first + v), options.perturbation.of(object.object, v)));
+    shown.show(perturbed(views.picture(object.first + v), options.perturbation, object.object, v));
     const double distance =
         (aligned ? shown.distance_at(record.misalignments[v], o) : shown.distance(o, std::nullopt)).own;
     if (!aligned && model.parts) record.misalignments.push_back(shown.misalignment());
@@ -80,7 +80,7 @@ VotesOfViews vote_for_own_views(const PartsModel& model, const TrainingViews& vi
   std::vector<float> background;
   VotesOfViews result;
   for (std::size_t v = 0; v < object.count; v += stride) {
-    const cv::Mat picture = displaced(views.picture(object.first + v), options.residual.of(object.object, v));
+    const cv::Mat picture = perturbed(views.picture(object.first + v), options.residual, object.object, v);
     if (!model.colors.empty())
       result.colors.push_back(
           color_distances(model.colors[o], chromaticity_map(picture, model.background), v));
@@ -143,6 +143,7 @@ void measure_windows(const PartsModel& parts, const TrainingViews& views, const 
   for (const ObjectRecord& own : objects) {
     const auto expected = [&](const auto& measured) {
       std::vector<double> halfway;
+      halfway.reserve(measured.size());
       for (const auto& one : measured) halfway.push_back(one[0] + yardsticks.half_step * (one[1] - one[0]));
       return halfway.empty() ? 0.0 : mean(halfway);
     };

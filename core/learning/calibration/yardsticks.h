@@ -18,9 +18,9 @@
 namespace eigenpose {
 
 struct YardstickOptions {
-  Perturbation perturbation{.shift = 2.0 / 128.0, .scale = 0.03, .turn_deg = 3.0};
+  Perturbation perturbation{.shift = 2.0 / 128.0, .scale = 0.03, .turn_deg = 3.0, .tint = usual_tint};
   /// The misalignment that alignment leaves, for windows.
-  Perturbation residual{.shift = 0.5 / 64.0, .scale = 0.01, .turn_deg = 1.0};
+  Perturbation residual{.shift = 0.5 / 64.0, .scale = 0.01, .turn_deg = 1.0, .tint = usual_tint};
   unsigned threads = 0;
   /// What a former calibration measured of each object alone: empty records are measured, the others are
   /// used.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
@@ -83,6 +84,40 @@ TEST(Perturbation, OfAViewIsTheSameAgainAndAnotherForEachViewAndObject) {
   EXPECT_NE(perturbation.of("duck", 3).dx, perturbation.of("duck", 4).dx);
   EXPECT_NE(perturbation.of("duck", 3).dx, perturbation.of("mug", 3).dx);
   EXPECT_NE(seed_of("ab", 0), seed_of("ba", 0));
+}
+
+TEST(Perturbed, TintsRedAndBlueWithinTheBoundOfEachViewAlike) {
+  const cv::Mat picture(8, 8, CV_8UC3, cv::Scalar(200, 200, 200));
+  const Perturbation by{.tint = 0.1};
+  std::set<int> blues;
+  std::set<int> reds;
+  for (std::size_t view = 0; view < 40; ++view) {
+    const cv::Mat tinted = perturbed(picture, by, "duck", view);
+    const auto pixel = tinted.at<cv::Vec3b>(3, 5);
+    EXPECT_EQ(pixel[1], 200) << "green stays";
+    EXPECT_NEAR(pixel[0], 200, 20);
+    EXPECT_NEAR(pixel[2], 200, 20);
+    blues.insert(pixel[0]);
+    reds.insert(pixel[2]);
+    EXPECT_EQ(cv::norm(tinted, perturbed(picture, by, "duck", view), cv::NORM_INF), 0.0) << "the same again";
+  }
+  EXPECT_LT(*blues.begin(), 190);
+  EXPECT_GT(*blues.rbegin(), 210);
+  EXPECT_LT(*reds.begin(), 190);
+  EXPECT_GT(*reds.rbegin(), 210);
+}
+
+TEST(Perturbed, DisplacesAsTheDrawOfTheViewSaysAndLeavesGreyAsItIs) {
+  cv::Mat picture(32, 32, CV_8UC1);
+  cv::RNG(5).fill(picture, cv::RNG::UNIFORM, 0, 255);
+  const Perturbation by{.shift = 0.05, .scale = 0.03, .turn_deg = 4.0, .tint = 0.1};
+  EXPECT_EQ(cv::norm(perturbed(picture, by, "duck", 7), displaced(picture, by.of("duck", 7)), cv::NORM_INF),
+            0.0);
+  cv::Mat color;
+  cv::cvtColor(picture, color, cv::COLOR_GRAY2BGR);
+  const Perturbation untinted{.shift = 0.05, .scale = 0.03, .turn_deg = 4.0};
+  EXPECT_EQ(cv::norm(perturbed(color, untinted, "duck", 7), displaced(color, by.of("duck", 7)), cv::NORM_INF),
+            0.0);
 }
 
 }  // namespace
