@@ -69,6 +69,19 @@ TEST(PartsStage, AsksTheWindowsWhereTheWholeRegionDoesNotSettleIt) {
   }
 }
 
+TEST(PartsStage, KnowsObjectsThoughTheLightIsOfASlightlyOtherColour) {
+  Recognizer recognize(parts_world().model);
+  for (const double red : {0.98, 1.02})
+    for (const double angle : {5.0, 40.0, 215.0}) {
+      cv::Mat scene = scene_of(1, angle);
+      cv::multiply(scene, cv::Scalar(1.0 / red, 1.0, red), scene);
+      const auto outcomes = recognize.recognize(scene);
+      ASSERT_EQ(outcomes.size(), 1U);
+      EXPECT_EQ(outcomes[0].verdict, Verdict::recognized) << red << " " << angle;
+      EXPECT_EQ(outcomes[0].best->object, "one");
+    }
+}
+
 TEST(PartsStage, SettlesByTheWholeRegionAloneWithEnoughEvidence) {
   // Windows that speak against everything are not asked.
   Recognizer recognize(parts_world().deciding([](DecisionModel& decision) {
