@@ -37,8 +37,8 @@ struct FewObjects {
 /// rate of 1 % asks for 4.6.
 constexpr FewObjects few_visible{8, 0.5};
 /// What looks like an occluded object has more: up to 7.5 where a rate of 1 % asks for 4.6. With these,
-/// models of 8 objects accept 0.6 % of other objects where 1 % is set (1.5 % with 16 in place of 24), and
-/// answer nine in ten known views with a fifth hidden.
+/// models of 8 objects accept 0.6 % of other objects where 1 % is set (7 draws; 1.5 % with 16 in place of
+/// 24), and answer nine in ten known views with a fifth hidden. Measured with probes that were not tinted.
 constexpr FewObjects few_occluded{24, 1.2};
 /// A rejected view must not have been settled by the whole region alone: of the known views, this many times
 /// the rate of false rejections are left to the windows.
