@@ -185,6 +185,12 @@ std::vector<OccludedAnswer> PartsRecognizer::Impl::find_rivals() {
   return rivals;
 }
 
+double PartsRecognizer::Impl::gain_of_masking(const PartsAnswer& answer) {
+  const auto above_noise = [this](double cost) { return std::log(std::max(cost, model.noise)); };
+  return above_noise(aligner.align(posed(), model.poses[answer.object]).front().cost) -
+         above_noise(answer.poses.front().cost);
+}
+
 PartsIdentification PartsRecognizer::Impl::identify_occluded() {
   const std::vector<OccludedAnswer> rivals = find_rivals();
   PartsIdentification found;
@@ -196,10 +202,6 @@ PartsIdentification PartsRecognizer::Impl::identify_occluded() {
                  pose.unexplained,
                  found.best.foreign_likeness,
                  color_match_of_visible(found.best.object, rivals[0].trust)};
-  const auto above_noise = [this](double cost) { return std::max(cost, model.noise); };
-  found.masking_gain =
-      std::log(above_noise(aligner.align(posed(), model.poses[found.best.object]).front().cost) /
-               above_noise(pose.cost));
   found.evidence = evidence_of(decision.weights, found.match);
   found.second_evidence = -std::numeric_limits<double>::infinity();
   if (rivals.size() > 1) {

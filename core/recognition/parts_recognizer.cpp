@@ -218,6 +218,10 @@ PartsIdentification PartsRecognizer::Votes::identify_occluded() const {
   return impl().identify_occluded();
 }
 
+double PartsRecognizer::Votes::gain_of_masking(const PartsAnswer& answer) const {
+  return impl().gain_of_masking(answer);
+}
+
 PartsRecognizer::Votes PartsRecognizer::Votes::without(std::size_t object, std::span<const int> views) const {
   impl().vote_without(object, views);
   return {*impl_, impl_->votes};

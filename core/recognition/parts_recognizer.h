@@ -52,9 +52,6 @@ struct PartsIdentification {
   PartsAnswer best;
   std::optional<PartsAnswer> second;  ///< the next object
   OccludedMatch match;                ///< of the best
-  /// How much better the best explains the pixels that it trusts than its best pose explains all of them: ln
-  /// of the ratio of their costs. Where nothing hides the object, about 0.
-  double masking_gain = 0.0;
   /// Λ of the best, and of the next: less by what its pose has less merit. −∞ without a second.
   double evidence = 0.0;
   double second_evidence = 0.0;
@@ -119,6 +116,9 @@ class PartsRecognizer::Votes {
   /// The object of a partly occluded region. Objects that are alike in what is visible are compared pixel by
   /// pixel.
   [[nodiscard]] PartsIdentification identify_occluded() const;
+  /// How much better an occluded object's pose explains the pixels that it trusts than its best pose explains
+  /// all of them: ln of the ratio of their costs. Where nothing hides the object, about 0.
+  [[nodiscard]] double gain_of_masking(const PartsAnswer& answer) const;
   /// The votes of the same windows if some learned views of an object had not been learned; all its views:
   /// if the object had not. These votes are no longer valid. @throws as match.
   [[nodiscard]] Votes without(std::size_t object, std::span<const int> views) const;

@@ -101,6 +101,8 @@ struct PartsRecognizer::Impl {
   /// Poses of one object on the visible pixels. @param occluded its share.
   PartsAnswer find_occluded_poses(std::size_t object, const std::vector<float>& plain, double occluded);
   PartsIdentification identify_occluded();
+  /// ln of the cost of the best pose over all pixels, over that of the best pose over the visible ones.
+  double gain_of_masking(const PartsAnswer& answer);
   const std::vector<float>& votes_of(std::size_t object);
   double share_after_alignment(std::size_t object, const PartsPose& pose);
   /// How much of the picture one candidate, or its neighbours, do not explain. Leaves κ in `likeness`.

@@ -78,7 +78,7 @@ std::optional<PartsIdentification> identify_if_occluded(const Model& model,
   if (occluded <= model.parts->calibration[first].foreign_share || occluded > tuning.most_occluded)
     return std::nullopt;
   PartsIdentification found = votes.identify_occluded();
-  if (found.masking_gain < tuning.least_masking_gain) return std::nullopt;
+  if (votes.gain_of_masking(found.best) < tuning.least_masking_gain) return std::nullopt;
   return found;
 }
 

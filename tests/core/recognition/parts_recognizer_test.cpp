@@ -127,7 +127,7 @@ TEST(PartsRecognizer, MaskingExplainsMuchWhereSomethingOccludesAndLittleWhereNot
   cv::Mat picture = test::DrawnObject(21).view(52.0);
   const auto gain_of = [&](const cv::Mat& shown) {
     const auto votes = recognizer.look(shown).vote();
-    return votes.identify_occluded().masking_gain;
+    return votes.gain_of_masking(votes.identify_occluded().best);
   };
   EXPECT_LT(gain_of(picture), 1.0);
   picture(cv::Rect(8, 18, 28, 28)).setTo(0);
