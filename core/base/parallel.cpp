@@ -11,28 +11,25 @@
 namespace eigenpose {
 namespace {
 
-/// What the threads of one parallel_for share. Every thread first takes an index and last counts itself out:
-/// by these two atomics it sees what the caller wrote, and the caller sees what the thread wrote.
+/// What the threads of one parallel_for share.
 struct Shared {
   std::size_t count;
   const std::function<void(std::size_t)>& work;
   std::atomic<std::size_t> next{0};
-  std::atomic<std::size_t> ended{0};
   std::mutex failure_mutex = {};
   std::exception_ptr failure = {};  ///< guarded by failure_mutex
 };
 
 void take_indices(void* context) {
   Shared& shared = *static_cast<Shared*>(context);
-  std::size_t i = shared.next.fetch_add(1);
   try {
-    for (; i < shared.count; i = shared.next.fetch_add(1)) shared.work(i);
+    for (std::size_t i = shared.next.fetch_add(1); i < shared.count; i = shared.next.fetch_add(1))
+      shared.work(i);
   } catch (...) {
     shared.next = shared.count;  // nobody begins anything new
     const std::lock_guard lock(shared.failure_mutex);
     if (!shared.failure) shared.failure = std::current_exception();
   }
-  shared.ended.fetch_add(1);
 }
 
 }  // namespace
@@ -48,9 +45,7 @@ void parallel_for(std::size_t count, unsigned threads, const std::function<void(
     return;
   }
   Shared shared{count, work};
-  shared.next.store(0);
   detail::call_on_threads(workers, &take_indices, &shared);
-  (void)shared.ended.load();
   if (shared.failure) std::rethrow_exception(shared.failure);
 }
 
