@@ -151,16 +151,16 @@ TEST(DecisionCalibration, UnknownViewsReachTheThresholdOfOccludedOnesAtMostAtThe
     probes.insert(probes.end(), hidden.begin(), hidden.end());
     const DecisionModel decision = calibrate_decision(probes, {0.01, 0.1});
     const auto accepted = [&](bool known, bool part_hidden) {
-      double accepted = 0.0;
+      double weight = 0.0;
       double shown = 0.0;
       for (const Probe& probe : probes) {
         if (probe.known != known || probe.hidden != part_hidden) continue;
         shown += 1.0;
         if (probe.occluded &&
             evidence_of(decision.weights, probe.occluded->match) >= decision.required_occluded)
-          accepted += 1.0;
+          weight += 1.0;
       }
-      return accepted / shown;
+      return weight / shown;
     };
     EXPECT_LE(accepted(false, false), 0.035) << taken << ": three tenths of the rate, others are visible";
     EXPECT_LE(accepted(false, true), 0.1) << taken;
