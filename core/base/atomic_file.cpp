@@ -145,8 +145,9 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::fail(const char* operation, int error) const {
+  std::error_code ignored;
   throw FileError(target_, std::string(operation) + ": " + write_trouble(error) +
-                               (fs::exists(target_) ? "; the former file is unchanged" : ""));
+                               (fs::exists(target_, ignored) ? "; the former file is unchanged" : ""));
 }
 
 void AtomicFile::write_at(std::uint64_t at, std::string_view bytes) {
@@ -248,7 +249,8 @@ void make_folders(const fs::path& folder) {
   std::error_code error;
   if (fs::is_directory(folder, error) || folder.empty()) return;
   make_folders(folder.parent_path());
-  if (!fs::create_directory(folder, error) && !fs::is_directory(folder))
+  std::error_code ignored;
+  if (!fs::create_directory(folder, error) && !fs::is_directory(folder, ignored))
     throw FileError(folder, "cannot be made: " + (error ? error.message() : "something else stands there"));
   OpenFolder above(folder_of(folder), FileCalls::system());
   const int trouble = above.open() ? above.flush() : errno;

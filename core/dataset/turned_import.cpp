@@ -53,7 +53,8 @@ std::vector<bool> finished_parts(const std::vector<std::string>& names, const st
   for (const std::string& name : names) {
     part.name = name;
     finished.push_back(import_finished(part, root, turntable_workspace(), source));
-    if (!finished.back() && std::filesystem::exists(root / name))
+    std::error_code unknown;  // where it cannot be looked up, writing it says why
+    if (!finished.back() && std::filesystem::exists(root / name, unknown))
       throw FileError(root / name, "stands there already; remove it or give the part another name");
   }
   return finished;
@@ -105,7 +106,9 @@ std::vector<std::string> import_turned(const std::filesystem::path& picture,
     for (std::size_t i = 0; i < parts.size(); ++i) names.push_back("part" + std::to_string(i + 1));
   check_names(names, parts.size(), picture);
 
-  const nlohmann::json source = {{"imported_from", std::filesystem::absolute(picture).string()},
+  std::error_code no_working_folder;
+  const std::filesystem::path from = std::filesystem::absolute(picture, no_working_folder);
+  const nlohmann::json source = {{"imported_from", (no_working_folder ? picture : from).string()},
                                  {"turned", true}};
   const std::vector<bool> finished = finished_parts(names, root, options.views, source);
   const Background& background = segmenter.background();

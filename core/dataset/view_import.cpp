@@ -122,7 +122,9 @@ class Importer {
       report_.sets.push_back({object.name, writer.views().size(), false});
       return;
     }
-    fs::remove_all(writer.folder());
+    std::error_code error;
+    fs::remove_all(writer.folder(), error);
+    if (error) throw FileError(writer.folder(), "cannot be removed: " + error.message());
     report_.left_out.push_back({object.name,
                                 {},
                                 true,
@@ -159,7 +161,8 @@ class Importer {
 bool import_finished(const ImportObject& object, const fs::path& root, const Workspace& workspace,
                      const json& source) {
   const fs::path folder = root / object.name;
-  if (!fs::exists(folder / "set.json")) return false;
+  std::error_code error;  // where it cannot be looked up, writing it says why
+  if (!fs::exists(folder / "set.json", error)) return false;
   const bool own = source_of(folder) == parse_json(json_line(source));  // as it is written
   const ImageSet set = ImageSet::open(folder);
   if (set.complete()) {
@@ -171,7 +174,8 @@ bool import_finished(const ImportObject& object, const fs::path& root, const Wor
                                 " views that this import did not begin; finish or remove it, or import into "
                                 "another folder");
   const FileLock alone(folder / ".lock", "the image set");
-  fs::remove_all(folder);
+  fs::remove_all(folder, error);
+  if (error) throw FileError(folder, "cannot be removed: " + error.message());
   return false;
 }
 

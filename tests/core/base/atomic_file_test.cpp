@@ -244,6 +244,17 @@ TEST_F(AtomicFileTest, WhatIsPreparedIsOnlyRenamedLater) {
   EXPECT_EQ(read(file_), "new");
 }
 
+/// Longer than any file system takes: asking whether it is there fails as in a folder that may not be
+/// searched, also for root.
+TEST_F(AtomicFileTest, ANameThatCannotEvenBeLookedUpIsAFileError) {
+  const fs::path unfindable = folder_ / std::string(300, 'x');
+  EXPECT_THAT(refusal([&] { write_file_atomically(unfindable, "new"); }), HasSubstr("cannot be replaced"));
+  EXPECT_THAT(refusal([&] { write_file_atomically(unfindable / "a.txt", "new"); }),
+              HasSubstr("cannot be written"));
+  EXPECT_THAT(refusal([&] { make_folders(unfindable); }), HasSubstr("cannot be made"));
+  EXPECT_THAT(files(), ElementsAre());
+}
+
 TEST_F(AtomicFileTest, FlushesLaterOnlyWhereThatIsAskedFor) {
   write_file_unflushed(file_, "new");
   EXPECT_EQ(read(file_), "new");

@@ -54,6 +54,13 @@ TEST_F(TurnedImport, TurnsEveryPartThatIsClearOfTheBorder) {
   EXPECT_FALSE(segmenter.segment(plate.load(1))[0].touches_border) << "there is room to turn in";
 }
 
+/// Longer than any file system takes: looking it up fails otherwise than by its absence, also for root.
+TEST_F(TurnedImport, AFolderThatCannotBeLookedUpIsAFileError) {
+  EXPECT_THROW(
+      import_turned(picture(), sets() / std::string(300, 'x'), {.names = {"plate", "disc"}, .views = 8}),
+      FileError);
+}
+
 TEST_F(TurnedImport, TurnsCounterClockwise) {
   cv::Mat lopsided(200, 200, CV_8UC1, cv::Scalar(20));
   cv::rectangle(lopsided, {60, 90, 80, 20}, 120, cv::FILLED);
