@@ -19,7 +19,13 @@ namespace {
 
 constexpr int margin = 12;  ///< pixels of background around a part, however it is turned
 
-/// The part in the middle of a square of background that it can turn in.
+/// A part, in the middle of a square of background that it can turn in.
+struct TurnedPart {
+  std::string name;
+  cv::Mat square;
+  cv::Scalar background;
+};
+
 cv::Mat in_a_square(const cv::Mat& cut, const Background& background) {
   const int side = static_cast<int>(std::ceil(std::hypot(cut.cols, cut.rows))) + 2 * margin;
   cv::Mat square(side, side, cut.type(), background.color());
@@ -60,11 +66,11 @@ std::vector<bool> finished_parts(const std::vector<std::string>& names, const st
   return finished;
 }
 
-/// Writes the image set of one part; leaves nothing where it fails.
-void write_turns(const cv::Mat& square, const cv::Scalar& background, const std::filesystem::path& root,
-                 const std::string& name, const nlohmann::json& source, std::size_t views,
-                 const std::function<void(std::size_t)>& step) {
-  ImageSetWriter writer(root, name, turntable_workspace(), source, {.sync_every_view = false});
+/// Writes the image set of one part; leaves nothing where it fails. @param step is called before each view.
+void write_turns(const TurnedPart& part, const std::filesystem::path& root, const nlohmann::json& source,
+                 std::size_t views, const std::function<void(std::size_t)>& step) {
+  const cv::Mat& square = part.square;
+  ImageSetWriter writer(root, part.name, turntable_workspace(), source, {.sync_every_view = false});
   try {
     const auto middle = 0.5F * static_cast<float>(square.cols - 1);
     for (std::size_t v = 0; v < views; ++v) {
@@ -72,13 +78,13 @@ void write_turns(const cv::Mat& square, const cv::Scalar& background, const std:
       const double degrees = 360.0 * static_cast<double>(v) / static_cast<double>(views);
       cv::Mat turned;
       cv::warpAffine(square, turned, cv::getRotationMatrix2D({middle, middle}, degrees, 1.0), square.size(),
-                     cv::INTER_LINEAR, cv::BORDER_CONSTANT, background);
+                     cv::INTER_LINEAR, cv::BORDER_CONSTANT, part.background);
       writer.add(turned, {degrees});
     }
     writer.finish();
   } catch (...) {
     std::error_code ignored;
-    std::filesystem::remove_all(root / name, ignored);
+    std::filesystem::remove_all(root / part.name, ignored);
     throw;
   }
 }
@@ -114,13 +120,12 @@ std::vector<std::string> import_turned(const std::filesystem::path& picture,
   const Background& background = segmenter.background();
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (finished[p]) continue;
-    write_turns(in_a_square(segmenter.cut_out(image, parts[p]), background), background.color(), root,
-                names[p], source, options.views, [&](std::size_t view) {
-                  if (stop.stop_requested())
-                    throw Interrupted("interrupted; the sets finished before are kept");
-                  if (progress)
-                    progress({"turning", p * options.views + view + 1, parts.size() * options.views});
-                });
+    const TurnedPart part{names[p], in_a_square(segmenter.cut_out(image, parts[p]), background),
+                          background.color()};
+    write_turns(part, root, source, options.views, [&](std::size_t view) {
+      if (stop.stop_requested()) throw Interrupted("interrupted; the sets finished before are kept");
+      if (progress) progress({"turning", p * options.views + view + 1, parts.size() * options.views});
+    });
   }
   return names;
 }
