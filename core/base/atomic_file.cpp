@@ -23,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view part_prefix = ".eigenpose-part-";
+constexpr const char* staged_suffix = ".next";
 
 fs::path folder_of(const fs::path& file) {
   const fs::path folder = file.parent_path();
@@ -184,20 +185,31 @@ void AtomicFile::sync() {
   if (calls_.fsync(fd_) != 0) fail("cannot be flushed to the disk", errno);
 }
 
-void AtomicFile::replace() {
+void AtomicFile::rename_part(const fs::path& name) {
   // The lock stays until the part has its name: others would take it for an abandoned one.
-  const int locked = ::fcntl(fd_, F_DUPFD_CLOEXEC, 0);
+  const int locked = fd_ >= 0 ? ::fcntl(fd_, F_DUPFD_CLOEXEC, 0) : -1;
   // Network file systems and quotas report here what they could not write. The descriptor is gone either way.
-  const bool closed = calls_.close(std::exchange(fd_, -1)) == 0 || errno == EINTR;
-  renamed_ = closed && calls_.rename(part_.c_str(), target_.c_str()) == 0;
+  const bool closed = fd_ < 0 || calls_.close(std::exchange(fd_, -1)) == 0 || errno == EINTR;
+  const bool renamed = closed && calls_.rename(part_.c_str(), name.c_str()) == 0;
   const int error = errno;
   if (locked >= 0) ::close(locked);
   if (!closed) fail("cannot be written", error);
-  if (!renamed_) fail("cannot be replaced", error);
+  if (!renamed) fail("cannot be replaced", error);
+  renamed_ = true;
+  part_ = name;
+}
+
+void AtomicFile::rename_part_durably(const fs::path& name) {
+  OpenFolder folder(folder_of(target_), calls_);
+  if (!folder.open()) fail("its folder cannot be opened to flush it", errno);
+  rename_part(name);
+  if (const int error = folder.flush(); error != 0)
+    throw FileError(name,
+                    "is written, but its folder cannot be flushed to the disk: " + write_trouble(error));
 }
 
 void AtomicFile::commit_unflushed() {
-  replace();
+  rename_part(target_);
 }
 
 void AtomicFile::prepare(const Verify& verify) {
@@ -217,14 +229,18 @@ void AtomicFile::prepare(const Verify& verify) {
   }
 }
 
+fs::path AtomicFile::staged_name(const fs::path& target) {
+  return resolved(target) += staged_suffix;
+}
+
+void AtomicFile::stage() {
+  if (!prepared_) prepare();
+  rename_part_durably(staged_name(target_));
+}
+
 void AtomicFile::commit(const Verify& verify) {
   if (!prepared_) prepare(verify);
-  OpenFolder folder(folder_of(target_), calls_);
-  if (!folder.open()) fail("its folder cannot be opened to flush it", errno);
-  replace();
-  if (const int error = folder.flush(); error != 0)
-    throw FileError(target_,
-                    "is written, but its folder cannot be flushed to the disk: " + write_trouble(error));
+  rename_part_durably(target_);
 }
 
 void write_file_atomically(const fs::path& target, std::string_view bytes, FileCalls& calls) {

@@ -66,9 +66,19 @@ class AtomicFile {
   /// that replace former ones together. At most once; nothing is written afterwards.
   /// @throws FileError naming the target; what `verify` throws is reworded so, unless it is no Error.
   void prepare(const Verify& verify = {});
+  /// `prepare` unless that was done, then close, rename to `staged_name`, fsync of the folder: the file
+  /// survives a crash before `commit`, and the target is as it was. The destructor leaves a staged file. For
+  /// a file that replaces its target together with another file: stage this one, replace the other one,
+  /// commit this one; after a crash the other one decides which of target and staged file is meant. At most
+  /// once.
+  /// @throws FileError naming the target.
+  void stage();
+  /// Where a file for `target` stands between `stage` and `commit`: beside what a symbolic link names.
+  /// @throws FileError where the target is no plain file.
+  [[nodiscard]] static std::filesystem::path staged_name(const std::filesystem::path& target);
   /// `prepare` unless that was done, then close, rename, fsync of the folder. At most once.
   /// @throws FileError naming the target, as `prepare`. The target is then as it was, unless the folder's
-  /// fsync failed: the message says so.
+  /// fsync failed: the message says so. A staged file stays staged.
   void commit(const Verify& verify = {});
   /// Close and rename alone, for many files that are flushed together afterwards (flush_file_system): until
   /// then a failing power supply may leave the file empty. At most once. @throws FileError.
@@ -77,7 +87,8 @@ class AtomicFile {
  private:
   [[nodiscard]] bool make_part(const std::filesystem::path& folder, unsigned serial);
   void sync();
-  void replace();
+  void rename_part(const std::filesystem::path& name);
+  void rename_part_durably(const std::filesystem::path& name);
   [[noreturn]] void fail(const char* operation, int error) const;
 
   FileCalls& calls_;
@@ -86,7 +97,7 @@ class AtomicFile {
   int fd_ = -1;
   std::uint64_t size_ = 0;
   bool prepared_ = false;
-  bool renamed_ = false;
+  bool renamed_ = false;  ///< staged or committed: the destructor removes nothing
 };
 
 /// The whole of `bytes` becomes the content of `target`, or nothing changes. @throws FileError.

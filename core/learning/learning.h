@@ -65,8 +65,8 @@ struct LearningReport {
   Duration parts_time{};        ///< windows and alignment eigenspaces
   Duration calibration_time{};  ///< yardsticks, probes and decision
   Duration total_time{};
-  /// The kept views, written and verified. Commit them when the model is saved: then neither a full disk nor
-  /// a crash leaves a model with the views of another. Learning without a report commits them itself. Null
+  /// The kept views, written and verified. `save_with_views` saves them with the model: then neither a full
+  /// disk nor a crash leaves a model without its views. Learning without a report commits them itself. Null
   /// where none are kept.
   std::shared_ptr<AtomicFile> kept_views;
 };

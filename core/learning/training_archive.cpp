@@ -7,12 +7,14 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/printable.h"
 #include "core/dataset/natural_order.h"
 #include "core/learning/calibration/decision_calibration.h"
 #include "core/learning/calibration_file.h"
 #include "core/model/hdf5_file.h"
 #include "core/model/hdf5_links.h"
 #include "core/model/hdf5_output.h"
+#include "core/model/model_file.h"
 #include "core/model/sealed_file.h"
 
 namespace eigenpose {
@@ -257,6 +259,71 @@ std::unique_ptr<AtomicFile> TrainingArchiveWriter::finish(const CalibrationRecor
   seal_file(views_format, *file_);
   file_->prepare([](const std::filesystem::path& part) { const TrainingArchive readable(part); });
   return std::move(file_);
+}
+
+namespace {
+
+/// The views that an interrupted `save_with_views` left staged, where they are those of the model; else null.
+std::unique_ptr<TrainingArchive> staged_views(const std::filesystem::path& file, const Model& model) {
+  const std::filesystem::path staged = AtomicFile::staged_name(file);
+  std::error_code error;
+  if (!std::filesystem::exists(staged, error)) return nullptr;
+  try {
+    auto views = std::make_unique<TrainingArchive>(staged);
+    if (views->belong_to(model)) return views;
+  } catch (const FileError&) {  // damaged, or of another version: of no use
+  }
+  return nullptr;
+}
+
+/// The model in the file, where there is one that can be read.
+std::optional<Model> saved_model(const std::filesystem::path& file) {
+  try {
+    return load_model(file);
+  } catch (const FileError&) {
+    return std::nullopt;
+  }
+}
+
+/// Puts staged views that belong to the saved model in their place, before others are staged.
+void finish_interrupted_save(const std::filesystem::path& model_file, const std::filesystem::path& views) {
+  std::error_code error;
+  const std::filesystem::path staged = AtomicFile::staged_name(views);
+  if (!std::filesystem::exists(staged, error)) return;
+  const std::optional<Model> saved = saved_model(model_file);
+  if (!saved || !staged_views(views, *saved)) return;
+  std::filesystem::rename(staged, views, error);
+  if (error) throw FileError(views, "cannot be replaced: " + error.message());
+}
+
+}  // namespace
+
+void save_with_views(const Model& model, const std::filesystem::path& model_file, AtomicFile& views) {
+  finish_interrupted_save(model_file, views.target());
+  views.stage();
+  try {
+    save_model(model, model_file);
+  } catch (...) {
+    // It may have been replaced all the same: where only its folder could not be flushed.
+    const std::optional<Model> saved = saved_model(model_file);
+    std::error_code ignored;
+    if (!saved || !staged_views(views.target(), *saved)) std::filesystem::remove(views.part(), ignored);
+    throw;
+  }
+  try {
+    views.commit();
+  } catch (const FileError& error) {
+    throw FileError(model_file, std::string("is replaced, but its views stand in ") +
+                                    printable(views.part().string()) +
+                                    ", where an update finds them: " + error.what());
+  }
+}
+
+std::unique_ptr<TrainingArchive> open_kept_views(const std::filesystem::path& file, const Model& model) {
+  if (auto staged = staged_views(file, model)) return staged;
+  auto kept = std::make_unique<TrainingArchive>(file);
+  if (kept->belong_to(model)) return kept;
+  return nullptr;
 }
 
 std::vector<TrainingSet> updated_sets(const TrainingArchive& kept, std::span<const std::string> leaving,

@@ -98,6 +98,16 @@ class TrainingArchiveWriter {
   std::unique_ptr<ScratchFile> put_aside_;  ///< they themselves
 };
 
+/// Saves a model and the views that were kept with it (LearningReport::kept_views). After a crash at any
+/// point, and after any failure, `open_kept_views` finds the views of the model that then stands in
+/// `model_file`. @throws FileError saying which of the two is not there.
+void save_with_views(const Model& model, const std::filesystem::path& model_file, AtomicFile& views);
+
+/// The views that `model` was learned from: in `file`, or staged beside it (AtomicFile::staged_name) where
+/// saving was interrupted. @return null where neither belongs to the model.
+/// @throws FileError where no such file is there, or it is damaged.
+std::unique_ptr<TrainingArchive> open_kept_views(const std::filesystem::path& file, const Model& model);
+
 /// The kept objects without those that leave, and the image sets that join, in the order of
 /// `open_image_sets`: the model learned from them with the kept options is the one that is learned anew from
 /// all their image sets.

@@ -46,10 +46,11 @@ Examples:
 The model is written at once when all is learned; a former model of that name stays until then.
 
 --keep-views writes FILE.views beside the model: the normalised views, their inner products and what calibration
-measured at them. --update makes of it the model that would be learned anew from all image sets, with the options that
-it was learned with. It reads the images of new objects alone; the folders of the others may be gone. Old views are
-measured again where an object that joined or left is near them; all of them, once a quarter of the objects has
-changed. To learn an object anew, remove it and let it join in one command.)";
+measured at them; they stand in FILE.views.next while the model is being replaced. --update makes of them the model
+that would be learned anew from all image sets, with the options that it was learned with. It reads the images of new
+objects alone; the folders of the others may be gone. Old views are measured again where an object that joined or left
+is near them; all of them, once a quarter of the objects has changed. To learn an object
+anew, remove it and let it join in one command.)";
 
 struct LearnOptions {
   std::string sets;
@@ -167,9 +168,9 @@ Lesson next_lesson(const LearnOptions& options) {
     throw ConfigError("--update: name a folder of image sets that join, or objects that leave with --remove");
   Lesson lesson;
   lesson.former = std::make_unique<Model>(load_model(options.update));
-  lesson.kept = std::make_unique<TrainingArchive>(views_file(options.update));
-  if (!lesson.kept->belong_to(*lesson.former))
-    throw FileError(lesson.kept->file(),
+  lesson.kept = open_kept_views(views_file(options.update), *lesson.former);
+  if (lesson.kept == nullptr)
+    throw FileError(views_file(options.update),
                     "does not belong to " + options.update +
                         ", which was learned anew since; learn it from its image sets, with --keep-views");
   lesson.options = lesson.kept->options();
@@ -238,13 +239,10 @@ int run_learn(LearnOptions options, const CLI::App& command, const std::stop_tok
   print_left_out(lesson.left_out);
   print_left_out(report.left_out);
   if (update) check_joined(lesson, model);
-  save_model(model, options.to);
-  if (report.kept_views) try {
-      report.kept_views->commit();
-    } catch (const FileError& error) {
-      throw FileError(options.to, std::string("is learned and replaced, but its views could not be kept: ") +
-                                      error.what() + "; to update it again, learn it with --keep-views");
-    }
+  if (report.kept_views)
+    save_with_views(model, options.to, *report.kept_views);
+  else
+    save_model(model, options.to);
   print(model, report, options.to);
   return exit_done;
 }

@@ -52,6 +52,22 @@ TEST_F(UpdateCommand, ChangesNothingWhereASetCannotJoin) {
   EXPECT_EQ(bytes("a.model.views"), views);
 }
 
+TEST_F(UpdateCommand, GoesOnAfterAnInterruptionBetweenTheRenamesOfModelAndViews) {
+  testing::write_turn(path("sets2"), "cup", 3, 18);
+  testing::write_turn(path("sets3"), "car", 4, 18);
+  const std::string former = bytes("a.model.views");
+  ASSERT_EQ(eigenpose("learn sets2 --update a.model").code, 0);
+  EXPECT_FALSE(std::filesystem::exists(path("a.model.views.next")));
+  // As it stands after a crash behind the first of the two renames.
+  std::filesystem::rename(path("a.model.views"), path("a.model.views.next"));
+  std::ofstream(path("a.model.views"), std::ios::binary) << former;
+  const Ended run = eigenpose("learn sets3 --update a.model");
+  EXPECT_EQ(run.code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("learned 4 objects"));
+  EXPECT_FALSE(std::filesystem::exists(path("a.model.views.next")));
+  EXPECT_EQ(eigenpose("learn --update a.model --remove car").code, 0);
+}
+
 TEST_F(UpdateCommand, WritesNoModelOverKeptViews) {
   const std::string views = bytes("a.model.views");
   const Ended run = eigenpose("learn --update a.model --remove duck --to a.model.views");

@@ -244,6 +244,62 @@ TEST_F(AtomicFileTest, WhatIsPreparedIsOnlyRenamedLater) {
   EXPECT_EQ(read(file_), "new");
 }
 
+TEST_F(AtomicFileTest, WhatIsStagedOutlivesItsProgramAndReplacesNothingBeforeItIsCommitted) {
+  write_file_atomically(file_, "former");
+  EXPECT_EQ(AtomicFile::staged_name(file_), folder_ / "a.txt.next");
+  {
+    ScriptedCalls calls;
+    AtomicFile file(file_, calls);
+    file.write("new");
+    file.stage();
+    EXPECT_THAT(calls.made, ElementsAre("open", "write", "sync", "open folder", "close", "rename",
+                                        "sync folder", "close"));
+    EXPECT_EQ(file.part(), folder_ / "a.txt.next");
+    EXPECT_EQ(read(file_), "former");
+  }
+  EXPECT_EQ(read(folder_ / "a.txt.next"), "new");
+  ScriptedCalls calls;
+  AtomicFile file(file_, calls);
+  file.write("newer");
+  file.stage();
+  calls.made.clear();
+  file.commit();
+  EXPECT_THAT(calls.made, ElementsAre("open folder", "rename", "sync folder", "close"));
+  EXPECT_EQ(read(file_), "newer");
+  EXPECT_THAT(files(), ElementsAre("a.txt"));
+}
+
+TEST_F(AtomicFileTest, IsStagedBesideTheFileThatALinkNames) {
+  fs::create_directory(folder_ / "far");
+  write_file_atomically(folder_ / "far" / "b.txt", "former");
+  fs::create_symlink("far/b.txt", file_);
+  EXPECT_EQ(AtomicFile::staged_name(file_), folder_ / "far" / "b.txt.next");
+  AtomicFile file(file_);
+  file.write("new");
+  file.stage();
+  EXPECT_EQ(read(folder_ / "far" / "b.txt.next"), "new");
+  file.commit();
+  EXPECT_TRUE(fs::is_symlink(file_));
+  EXPECT_EQ(read(folder_ / "far" / "b.txt"), "new");
+}
+
+TEST_F(AtomicFileTest, EveryCallOfStagingThatFailsIsAnErrorAndKeepsTheFormerFile) {
+  write_file_atomically(file_, "former");
+  const int calls_to_stage = 8;
+  for (int failing = 0; failing < calls_to_stage; ++failing) {
+    ScriptedCalls calls;
+    calls.failing = failing;
+    EXPECT_NE(refusal([&] {
+                AtomicFile file(file_, calls);
+                file.write("new");
+                file.stage();
+              }),
+              "done")
+        << failing;
+    EXPECT_EQ(read(file_), "former") << failing;
+  }
+}
+
 /// Longer than any file system takes: asking whether it is there fails as in a folder that may not be
 /// searched, also for root.
 TEST_F(AtomicFileTest, ANameThatCannotEvenBeLookedUpIsAFileError) {
