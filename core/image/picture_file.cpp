@@ -37,6 +37,20 @@ Decoder decoder_of(Bytes bytes) {
   return nullptr;
 }
 
+/// @throws Error where the format takes no such picture; the library says so in two ways.
+std::vector<unsigned char> encode(const cv::Mat& image, const char* format,
+                                  const std::vector<int>& parameters) {
+  std::vector<unsigned char> bytes;
+  std::string cause;
+  try {
+    if (cv::imencode(format, image, bytes, parameters) && !bytes.empty()) return bytes;
+  } catch (const cv::Exception& failure) {
+    cause = std::string(" (") + failure.what() + ")";
+  }
+  throw Error("a picture of " + std::to_string(image.cols) + "x" + std::to_string(image.rows) +
+              " pixels cannot be written as " + format + cause + "; use a smaller one");
+}
+
 }  // namespace
 
 cv::Mat decode_picture(Bytes bytes, const std::filesystem::path& name) {
@@ -61,10 +75,12 @@ std::vector<unsigned char> encode_png(const cv::Mat& image) {
     throw std::invalid_argument("a view is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
                                 cv::typeToString(image.type()) + ", " + std::to_string(image.cols) + "x" +
                                 std::to_string(image.rows));
-  std::vector<unsigned char> bytes;
   // Level 1 is 5 times faster than the default and a tenth larger.
-  cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  return bytes;
+  return encode(image, ".png", {cv::IMWRITE_PNG_COMPRESSION, 1});
+}
+
+std::vector<unsigned char> encode_jpeg(const cv::Mat& image, int quality) {
+  return encode(image, ".jpg", {cv::IMWRITE_JPEG_QUALITY, quality});
 }
 
 }  // namespace eigenpose

@@ -29,7 +29,12 @@ cv::Mat load_picture(const std::filesystem::path& file);
 /// The same from memory; `name` is what errors call it.
 cv::Mat decode_picture(std::span<const unsigned char> bytes, const std::filesystem::path& name);
 
-/// Encodes as PNG. @throws std::invalid_argument for a type that `load_picture` does not return.
+/// Encodes as PNG. @throws std::invalid_argument for a type that `load_picture` does not return, Error where
+/// the picture cannot be encoded: a million pixels wide or high.
 std::vector<unsigned char> encode_png(const cv::Mat& image);
+
+/// Encodes 8-bit grey or BGR as JPEG. @param quality 1…100. @throws Error where it cannot be encoded: more
+/// than 65,500 pixels wide or high.
+std::vector<unsigned char> encode_jpeg(const cv::Mat& image, int quality);
 
 }  // namespace eigenpose

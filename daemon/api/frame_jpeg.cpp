@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
+#include "core/image/picture_file.h"
 
 namespace eigenpose {
 namespace {
@@ -16,8 +16,7 @@ std::shared_ptr<const std::string> FrameJpeg::of(const Frame& frame) {
   if (bytes_ && frame.sequence == sequence_ && frame.exposure_start == exposure_start_) return bytes_;
   cv::Mat image = frame.image;
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 256.0);
-  std::vector<unsigned char> encoded;
-  cv::imencode(".jpg", image, encoded, {cv::IMWRITE_JPEG_QUALITY, quality});
+  const std::vector<unsigned char> encoded = encode_jpeg(image, quality);
   bytes_ = std::make_shared<const std::string>(encoded.begin(), encoded.end());
   sequence_ = frame.sequence;
   exposure_start_ = frame.exposure_start;

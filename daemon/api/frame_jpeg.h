@@ -14,7 +14,7 @@ namespace eigenpose {
 /// Keeps the last frame that was asked for. Thread-safe; those who ask while one encodes wait for it.
 class FrameJpeg {
  public:
-  /// The frame's JPEG. A 16-bit picture keeps its upper eight bits.
+  /// The frame's JPEG. A 16-bit picture keeps its upper eight bits. @throws Error where it cannot be encoded.
   [[nodiscard]] std::shared_ptr<const std::string> of(const Frame& frame);
 
  private:

@@ -37,6 +37,21 @@ TEST(PictureFile, GivesBackEveryPixelOfEveryKind) {
   }
 }
 
+TEST(PictureFile, APictureThatTheFormatDoesNotTakeIsAnErrorAndNoEmptyFile) {
+  const auto refusal = [](const auto& encode) {
+    try {
+      encode();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("encoded");
+  };
+  const cv::Mat wide(1, 1'000'001, CV_8UC1, cv::Scalar(7));
+  EXPECT_THAT(refusal([&] { (void)encode_png(wide); }), HasSubstr("1000001x1"));
+  EXPECT_THAT(refusal([&] { (void)encode_jpeg(wide, 85); }), HasSubstr("1000001x1"));
+  EXPECT_FALSE(encode_jpeg(cv::Mat(8, 8, CV_8UC3, cv::Scalar(1, 2, 3)), 85).empty());
+}
+
 TEST(PictureFile, RefusesAPngCutAnywhere) {
   const auto bytes = encode_png(picture_noise(40, 40, CV_8UC1));
   for (std::size_t keep = 1; keep < bytes.size(); keep += 13)

@@ -14,8 +14,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "daemon/api/errors.h"
 #include "daemon/api/event_publisher.h"
+#include "daemon/api/frame_jpeg.h"
 #include "daemon/api/target.h"
 #include "tests/daemon/fakes.h"
 #include "tests/support/temporary_folder.h"
@@ -336,6 +338,18 @@ TEST_F(Routes, TheLatestResultSaysItsAgeAndRun) {
   EXPECT_EQ(result.at("run"), publisher_.results()->run());
   EXPECT_GE(result.at("age_s").get<double>(), 7.0);
   EXPECT_LT(result.at("age_s").get<double>(), 8.0 + 60.0);
+}
+
+TEST_F(Routes, ThePictureThatCannotBeEncodedIsAnErrorAndNoEmptyBody) {
+  FrameJpeg frames;
+  Frame frame;
+  frame.sequence = 1;
+  frame.image = cv::Mat(4, 4, CV_8UC1, cv::Scalar(7));
+  EXPECT_FALSE(frames.of(frame)->empty());
+  frame.sequence = 2;
+  frame.image = cv::Mat(1, 70'000, CV_8UC1, cv::Scalar(7));  // JPEG counts to 65535
+  EXPECT_THROW((void)frames.of(frame), Error);
+  EXPECT_THROW((void)frames.of(frame), Error) << "nothing of it is kept";
 }
 
 TEST_F(Routes, AStreamContinuesBehindTheEventThatWasSeen) {
