@@ -163,6 +163,18 @@ Answer get_job(const Call& call) {
   return reply(to_json(found(call.service().jobs().find(call.id), call.id)));
 }
 
+/// Only jobs of that kind are found below its path.
+void check_is_acquisition(const Call& call) {
+  if (found(call.service().jobs().find(call.id), call.id).kind != JobKind::acquire)
+    throw ServiceError(Fault::not_found, "job \"" + call.id + "\" is no acquisition",
+                       "ask for /v1/jobs/" + call.id);
+}
+
+Answer get_acquisition(const Call& call) {
+  check_is_acquisition(call);
+  return get_job(call);
+}
+
 Answer cancel_job(const Call& call) {
   const JobStatus job = found(call.service().jobs().find(call.id), call.id);
   if (job.state != JobState::running)
@@ -170,6 +182,11 @@ Answer cancel_job(const Call& call) {
                        fmt::format("job {} has ended already: it is {}", call.id, job_state_name(job.state)),
                        "there is nothing left to cancel");
   return reply(to_json(found(call.service().jobs().cancel(call.id), call.id)), 202);
+}
+
+Answer cancel_acquisition(const Call& call) {
+  check_is_acquisition(call);
+  return cancel_job(call);
 }
 
 Response started(const JobStatus& job) {
@@ -248,8 +265,8 @@ constexpr Route routes[] = {
     {"GET", "/v1/jobs/{id}", Lane::read, "", get_job},
     {"DELETE", "/v1/jobs/{id}", Lane::stop, "", cancel_job},
     {"POST", "/v1/acquisitions", Lane::command, "", post_acquisition},
-    {"GET", "/v1/acquisitions/{id}", Lane::read, "", get_job},
-    {"DELETE", "/v1/acquisitions/{id}", Lane::stop, "", cancel_job},
+    {"GET", "/v1/acquisitions/{id}", Lane::read, "", get_acquisition},
+    {"DELETE", "/v1/acquisitions/{id}", Lane::stop, "", cancel_acquisition},
     {"POST", "/v1/learn", Lane::command, "", post_learn},
 };
 

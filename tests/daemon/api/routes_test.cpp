@@ -3,6 +3,7 @@
 #include "daemon/api/routes.h"
 
 #include <algorithm>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -286,6 +287,27 @@ TEST_F(Routes, AJobThatHasEndedCannotBeCancelled) {
   EXPECT_EQ(again.status, 409);
   EXPECT_THAT(error_of(again), HasSubstr("ended already: it is cancelled"));
   EXPECT_EQ(ask("DELETE", "/v1/acquisitions/" + id).status, 409);
+}
+
+TEST_F(Routes, AJobOfAnotherKindIsNoAcquisition) {
+  std::promise<void> leave;
+  const JobStatus learning =
+      service_->jobs().start(JobKind::learn, "", [&](const Jobs::Context&) -> JobResult {
+        leave.get_future().wait();
+        return {};
+      });
+  const std::string acquisition = running_job();
+  for (const char* method : {"GET", "DELETE"}) {
+    const Response refused = ask(method, "/v1/acquisitions/" + learning.id);
+    EXPECT_EQ(refused.status, 404) << method;
+    EXPECT_THAT(error_of(refused), HasSubstr("no acquisition")) << method;
+    EXPECT_EQ(ask(method, "/v1/acquisitions/99").status, 404) << method;
+  }
+  EXPECT_EQ(json::parse(ask("GET", "/v1/jobs/" + learning.id).body).at("kind"), "learn");
+  EXPECT_EQ(json::parse(ask("GET", "/v1/acquisitions/" + acquisition).body).at("id"), acquisition);
+  leave.set_value();
+  EXPECT_EQ(ended(learning.id).state, JobState::done) << "it was not cancelled";
+  EXPECT_EQ(ask("DELETE", "/v1/acquisitions/" + acquisition).status, 202);
 }
 
 TEST_F(Routes, AJobThatIsNotThereIs404) {
