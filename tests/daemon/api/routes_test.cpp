@@ -34,6 +34,56 @@ using testing::StartsWith;
 
 const std::string deep = std::string(40, '[') + std::string(40, ']');
 
+/// Bodies of requests: wrong for every path, for an acquisition, and for learning.
+const std::vector<std::string> wrong_anywhere = {"{",
+                                                 "nonsense",
+                                                 "[]",
+                                                 "7",
+                                                 "null",
+                                                 "{\"a\":1,}",
+                                                 deep,
+                                                 "{} {}",
+                                                 "\xff",
+                                                 "{\"a\":NaN}",
+                                                 "{\"object\":\"mug\",\"object\":\"mug\"}",
+                                                 "{\"unknown\":1}"};
+const std::vector<std::string> wrong_acquisitions = {
+    "{}",
+    R"({"object":1})",
+    R"({"object":null})",
+    R"({"object":""})",
+    R"({"object":["mug"]})",
+    R"({"object":"mug","plan":1})",
+    R"({"object":"mug","plan":null})",
+    R"({"object":"mug","plan":{}})",
+    R"({"object":"mug","plan":{"axes":{}}})",
+    R"({"object":"mug","plan":{"axes":[]}})",
+    R"({"object":"mug","plan":{"axes":[7]}})",
+    R"({"object":"mug","plan":{"axes":[{}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table"}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"other","at":[0]}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[]}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0,0]}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":["0"]}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[361]}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0],"count":1}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":2.9}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":true}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":0}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":4294967298}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":100001}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":"0","to":90,"count":2}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":1e999,"count":2}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"count":2}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0]},{"axis":"table","at":[1]}]}})",
+    R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0]}],"name":"x"}})"};
+const std::vector<std::string> wrong_learning = {
+    R"({"components":true})",       R"({"components":4294967297})", R"({"components":20.7})",
+    R"({"components":20.0})",       R"({"components":0})",          R"({"components":1025})",
+    R"({"components":-1})",         R"({"components":"20"})",       R"({"components":null})",
+    R"({"objects":"mug"})",         R"({"objects":[1]})",           R"({"objects":[]})",
+    R"({"objects":["mug","mug"]})", R"({"objects":["../mug"]})",    R"({"objects":null})"};
+
 class Routes : public testing::Test {
  protected:
   Routes() { start(std::chrono::seconds(10)); }
@@ -172,54 +222,6 @@ TEST_F(Routes, CommandsNeedTheControlSocket) {
 }
 
 TEST_F(Routes, ABodyThatIsWrongIs400AndStartsNothing) {
-  const std::vector<std::string> anywhere = {"{",
-                                             "nonsense",
-                                             "[]",
-                                             "7",
-                                             "null",
-                                             "{\"a\":1,}",
-                                             deep,
-                                             "{} {}",
-                                             "\xff",
-                                             "{\"a\":NaN}",
-                                             "{\"object\":\"mug\",\"object\":\"mug\"}",
-                                             "{\"unknown\":1}"};
-  const std::vector<std::string> acquisitions = {
-      "{}",
-      R"({"object":1})",
-      R"({"object":null})",
-      R"({"object":""})",
-      R"({"object":["mug"]})",
-      R"({"object":"mug","plan":1})",
-      R"({"object":"mug","plan":null})",
-      R"({"object":"mug","plan":{}})",
-      R"({"object":"mug","plan":{"axes":{}}})",
-      R"({"object":"mug","plan":{"axes":[]}})",
-      R"({"object":"mug","plan":{"axes":[7]}})",
-      R"({"object":"mug","plan":{"axes":[{}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table"}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"other","at":[0]}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[]}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0,0]}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":["0"]}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[361]}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0],"count":1}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":2.9}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":true}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":0}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":4294967298}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":90,"count":100001}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":"0","to":90,"count":2}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"to":1e999,"count":2}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","from":0,"count":2}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0]},{"axis":"table","at":[1]}]}})",
-      R"({"object":"mug","plan":{"axes":[{"axis":"table","at":[0]}],"name":"x"}})"};
-  const std::vector<std::string> learn = {
-      R"({"components":true})",       R"({"components":4294967297})", R"({"components":20.7})",
-      R"({"components":20.0})",       R"({"components":0})",          R"({"components":1025})",
-      R"({"components":-1})",         R"({"components":"20"})",       R"({"components":null})",
-      R"({"objects":"mug"})",         R"({"objects":[1]})",           R"({"objects":[]})",
-      R"({"objects":["mug","mug"]})", R"({"objects":["../mug"]})",    R"({"objects":null})"};
   const auto refused = [this](const std::string& path, const std::vector<std::string>& bodies) {
     for (const std::string& body : bodies) {
       const Response response = ask("POST", path, body);
@@ -227,10 +229,10 @@ TEST_F(Routes, ABodyThatIsWrongIs400AndStartsNothing) {
       EXPECT_THAT(response.body, HasSubstr("\"error\":")) << body;
     }
   };
-  refused("/v1/acquisitions", anywhere);
-  refused("/v1/acquisitions", acquisitions);
-  refused("/v1/learn", anywhere);
-  refused("/v1/learn", learn);
+  refused("/v1/acquisitions", wrong_anywhere);
+  refused("/v1/acquisitions", wrong_acquisitions);
+  refused("/v1/learn", wrong_anywhere);
+  refused("/v1/learn", wrong_learning);
   EXPECT_TRUE(service_->jobs().list().empty()) << "no job was started";
 }
 
