@@ -189,10 +189,14 @@ json ApiClient::wait_for_job(const std::string& id, const Progress& progress, st
     const std::string stage = text_of(job, "stage");
     if (progress && !stage.empty())
       progress({stage, job.value("done", std::size_t{0}), job.value("total", std::size_t{0})});
-    if (!clock.sleep_for(period, stop)) {
+    if (clock.sleep_for(period, stop)) continue;
+    try {
       remove("/v1/jobs/" + id);
-      throw Interrupted("job " + id + " is cancelled; what was done is kept");
+    } catch (const ApiError& error) {
+      if (error.status() == 409) continue;  // it has ended meanwhile: how, the next look says
+      throw;
     }
+    throw Interrupted("job " + id + " is cancelled; what was done is kept");
   }
 }
 

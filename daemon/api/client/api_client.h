@@ -56,7 +56,7 @@ class ApiClient {
               std::stop_token stop = {}) const;
 
   /// Waits for a job to end. @return the job. @throws ApiError when it failed or was cancelled; Interrupted
-  /// on `stop`, and then the job has been cancelled too.
+  /// on `stop`, and then the job has been cancelled too, unless it ended at that moment: then as without.
   nlohmann::json wait_for_job(const std::string& id, const Progress& progress = {},
                               std::stop_token stop = {}) const;
 
