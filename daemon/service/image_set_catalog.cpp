@@ -22,24 +22,50 @@ std::int64_t ticks(const fs::path& file, std::error_code& error) {
   return static_cast<std::int64_t>(fs::last_write_time(file, error).time_since_epoch().count());
 }
 
+std::vector<std::string> list_folder(const fs::path& folder, std::error_code& error) {
+  std::vector<std::string> names;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    names.push_back(entry->path().filename().string());
+  if (error == std::errc::no_such_file_or_directory) error.clear();  // nothing was acquired yet
+  return names;
+}
+
 }  // namespace
 
-ImageSetCatalog::ImageSetCatalog(fs::path folder, Heartbeat& heartbeat) : folder_(std::move(folder)) {
+ImageSetCatalog::ImageSetCatalog(fs::path folder, Heartbeat& heartbeat)
+    : ImageSetCatalog(std::move(folder), heartbeat, list_folder) {}
+
+ImageSetCatalog::ImageSetCatalog(fs::path folder, Heartbeat& heartbeat, List list)
+    : folder_(std::move(folder)), list_(std::move(list)) {
   refresh();
   pulse_ = heartbeat.join("catalog", catalog_look_limit);
-  thread_ = std::jthread([this](const std::stop_token& stop) {
-    std::mutex mutex;
-    std::condition_variable_any never;
-    std::unique_lock lock(mutex);
-    while (!stop.stop_requested()) {
-      pulse_.beat();
-      never.wait_for(lock, stop, catalog_look_period, [] { return false; });
-      if (!stop.stop_requested()) refresh();
-    }
-  });
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 ImageSetCatalog::~ImageSetCatalog() = default;
+
+void ImageSetCatalog::run(const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any never;
+  std::unique_lock lock(mutex);
+  while (!stop.stop_requested()) {
+    pulse_.beat();
+    never.wait_for(lock, stop, catalog_look_period, [] { return false; });
+    if (stop.stop_requested()) return;
+    try {
+      refresh();
+    } catch (const std::exception& error) {
+      const std::lock_guard reading(reading_);
+      report(error.what());
+    }
+  }
+}
+
+void ImageSetCatalog::report(const std::string& trouble) {
+  if (trouble != trouble_ && !trouble.empty())
+    spdlog::error("event=image_sets_unreadable folder={} error=\"{}\"", folder_.string(), trouble);
+  trouble_ = trouble;
+}
 
 std::vector<CatalogEntry> ImageSetCatalog::entries() const {
   const std::lock_guard lock(mutex_);
@@ -50,15 +76,15 @@ std::vector<CatalogEntry> ImageSetCatalog::entries() const {
 
 std::vector<CatalogEntry> ImageSetCatalog::refresh() {
   const std::lock_guard reading(reading_);
-  std::set<std::string> names;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder_, error))
-    names.insert(entry.path().filename().string());
+  const std::vector<std::string> listed = list_(folder_, error);
+  std::set<std::string> names(listed.begin(), listed.end());
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [name, kept] : kept_) names.insert(name);
   }
   for (const std::string& name : names) update(name);
+  report(error ? error.message() : "");
   return entries();
 }
 
@@ -74,8 +100,9 @@ std::optional<ImageSetCatalog::Stamp> ImageSetCatalog::stamp_of(const fs::path& 
   std::error_code error;
   const fs::path index = folder / "set.json";
   const fs::path journal = folder / "views.jsonl";
-  if (!fs::exists(index, error)) return std::nullopt;
+  if (!fs::exists(index, error) && !error) return std::nullopt;
   Stamp stamp;
+  if (error) return stamp;  // it may be there: reading it says what is wrong
   stamp.index_time = ticks(index, error);
   stamp.index_size = fs::file_size(index, error);
   if (fs::exists(journal, error)) {

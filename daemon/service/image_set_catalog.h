@@ -5,11 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -29,15 +32,22 @@ struct CatalogEntry {
 /// files have changed, and only these are read. Thread-safe.
 class ImageSetCatalog {
  public:
+  /// The names of the folders in a folder; `error` is set where not all could be listed.
+  using List =
+      std::function<std::vector<std::string>(const std::filesystem::path& folder, std::error_code& error)>;
+
   /// Reads the folder once, then starts the thread. The heartbeat outlives the catalog.
   ImageSetCatalog(std::filesystem::path folder, Heartbeat& heartbeat);
+  /// @param list replaces the system's listing; called on several threads, one call at a time.
+  ImageSetCatalog(std::filesystem::path folder, Heartbeat& heartbeat, List list);
   ImageSetCatalog(const ImageSetCatalog&) = delete;
   ImageSetCatalog& operator=(const ImageSetCatalog&) = delete;
   ~ImageSetCatalog();
 
   /// As of a few seconds ago, ordered by object. Reads no file.
   [[nodiscard]] std::vector<CatalogEntry> entries() const;
-  /// Looks now for what has changed, and reads it. @return the entries.
+  /// Looks now for what has changed, and reads it. Where the folder cannot be listed, what is known already
+  /// is looked at. @return the entries.
   std::vector<CatalogEntry> refresh();
   /// The entry of one object, whose files are looked at now; nothing if there is no set of that name.
   std::optional<CatalogEntry> look_up(const std::string& object);
@@ -57,11 +67,16 @@ class ImageSetCatalog {
   };
   static std::optional<Stamp> stamp_of(const std::filesystem::path& folder);
   static CatalogEntry read(const std::filesystem::path& folder);
+  void run(const std::stop_token& stop);
+  /// Logs a trouble once, until it ends or is another one. @param trouble empty: none.
+  void report(const std::string& trouble);
   /// Brings the entry of the folder of that name up to date.
   void update(const std::string& name);
 
   const std::filesystem::path folder_;
-  std::mutex reading_;  ///< one reader of files at a time
+  const List list_;
+  std::mutex reading_;   ///< one reader of files at a time
+  std::string trouble_;  ///< guarded by reading_: logged last
   mutable std::mutex mutex_;
   std::map<std::string, Kept> kept_;  ///< guarded by mutex_: by the folder's name
   Heartbeat::Pulse pulse_;            ///< beaten on the thread

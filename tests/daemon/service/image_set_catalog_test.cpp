@@ -1,6 +1,8 @@
 #include "daemon/service/image_set_catalog.h"
 
+#include <atomic>
 #include <fstream>
+#include <system_error>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -67,6 +69,46 @@ TEST_F(ImageSetCatalogTest, ANewSetIsFoundWithoutBeingAskedFor) {
   write("mug", 3);
   eventually([&] { return !catalog.entries().empty() && catalog.entries()[0].set != nullptr; });
   EXPECT_EQ(catalog.entries()[0].object, "mug");
+}
+
+TEST_F(ImageSetCatalogTest, AListingThatFailsInTheThreadEndsNeitherItNorTheProgram) {
+  write("mug", 3);
+  std::atomic<int> listings = 0;
+  const ImageSetCatalog catalog(
+      folder_.path(), heartbeat_,
+      [&](const std::filesystem::path&, std::error_code&) -> std::vector<std::string> {
+        if (++listings == 2)
+          throw std::filesystem::filesystem_error("listing", std::make_error_code(std::errc::io_error));
+        return listings > 2 ? std::vector<std::string>{"duck", "mug"} : std::vector<std::string>{"mug"};
+      });
+  write("duck", 3);
+  eventually([&] { return catalog.entries().size() == 2; });
+  EXPECT_GE(listings, 3);
+}
+
+TEST_F(ImageSetCatalogTest, WhatIsKnownStaysWhereTheFolderCannotBeListed) {
+  write("mug", 3);
+  bool fails = false;
+  ImageSetCatalog catalog(folder_.path(), heartbeat_,
+                          [&](const std::filesystem::path&, std::error_code& error) {
+                            if (!fails) return std::vector<std::string>{"mug"};
+                            error = std::make_error_code(std::errc::io_error);
+                            return std::vector<std::string>{};
+                          });
+  fails = true;
+  ASSERT_EQ(catalog.refresh().size(), 1U);
+  EXPECT_EQ(catalog.entries()[0].object, "mug");
+}
+
+/// Longer than any file system takes: looking it up fails otherwise than by its absence.
+TEST_F(ImageSetCatalogTest, ASetThatCannotBeLookedUpIsUnreadableAndNotGone) {
+  const std::string unfindable(300, 'x');
+  ImageSetCatalog catalog(folder_.path(), heartbeat_, [&](const std::filesystem::path&, std::error_code&) {
+    return std::vector<std::string>{unfindable};
+  });
+  ASSERT_EQ(catalog.entries().size(), 1U);
+  EXPECT_EQ(catalog.entries()[0].set, nullptr);
+  EXPECT_FALSE(catalog.entries()[0].error.empty());
 }
 
 TEST_F(ImageSetCatalogTest, ASetThatCannotBeReadIsKeptUnderItsFoldersNameWithTheReason) {
