@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -34,5 +35,8 @@ struct Admission {
 /// them to a user who has at least two fewer: the longest idle one, or if none is idle the quietest stream. A
 /// user with a full share gives up a connection of its own that is idle. Whoever is busy is never disturbed.
 Admission admit(std::span<const Place> places, std::size_t most, uid_t user);
+
+/// What decides in the place of `admit`.
+using AdmissionPolicy = std::function<Admission(std::span<const Place>, std::size_t most, uid_t user)>;
 
 }  // namespace eigenpose

@@ -12,6 +12,7 @@
 #include <functional>
 #include <memory>
 
+#include "daemon/api/admission.h"
 #include "daemon/api/http.h"
 #include "daemon/api/request_reader.h"
 #include "daemon/api/unix_socket.h"
@@ -27,6 +28,7 @@ struct ServerOptions {
   /// A comment on a silent stream, so that dead ones are noticed.
   std::chrono::milliseconds keep_alive{15'000};
   std::chrono::milliseconds beat_period{1'000};
+  AdmissionPolicy admit = eigenpose::admit;  ///< called on the server's thread
 };
 
 /// The server. Made, told to listen, started; the destructor stops it. The calls here belong to one thread.
@@ -41,7 +43,7 @@ class Server {
 
   /// Accepts clients on `socket`, which must outlive the server. Before `start`.
   /// @param most connections at once, ≥ 1; of these three quarters may be event streams. When there are more,
-  /// `admit` says who gives way; one that is turned away gets 503 and costs nothing that lasts.
+  /// `ServerOptions::admit` says who gives way; one that is turned away gets 503 and costs nothing that lasts.
   void listen(const UnixSocket& socket, Access access, int most);
   void start();
   /// Wakes the event streams: call it after publishing. Thread-safe.

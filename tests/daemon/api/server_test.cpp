@@ -3,6 +3,9 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <new>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -46,6 +49,81 @@ TEST_F(ServerTest, AnswersSeveralRequestsOnOneConnection) {
   EXPECT_THAT(client.read_until("/hello"), StartsWith("HTTP/1.1 200 OK"));
   client.send(get_last);
   EXPECT_THAT(client.read_all(), HasSubstr("Connection: close"));
+}
+
+/// Its application throws, which it must not.
+class ThrowingServerTest : public ServerTest {
+ protected:
+  Application application() override {
+    Application result = ServerTest::application();
+    result.answer = [echo = result.answer](const Request& request) -> Answer {
+      if (request.path == "/throw") throw std::runtime_error("an oversight");
+      if (request.path == "/throw-anything") throw 7;
+      return echo(request);
+    };
+    result.lane = [](const Request& request) {
+      if (request.path == "/no-lane") throw std::runtime_error("an oversight");
+      return Lane::read;
+    };
+    return result;
+  }
+  [[nodiscard]] std::string answer_to(const std::string& path) const {
+    return exchange("GET " + path + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  }
+};
+
+TEST_F(ThrowingServerTest, AnExceptionEndsItsOwnRequestAndNothingElse) {
+  start({}, 2);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_THAT(answer_to("/throw"), StartsWith("HTTP/1.1 500 "));
+    EXPECT_THAT(answer_to("/throw-anything"), StartsWith("HTTP/1.1 500 "));
+    EXPECT_EQ(answer_to("/no-lane"), "") << "its connection is closed";
+    expect_alive();
+  }
+}
+
+TEST_F(ServerTest, AnExceptionWhileAClientIsAdmittedLosesThatClientAlone) {
+  int admissions = 0;  // on the server's thread
+  ServerOptions options;
+  options.admit = [&](std::span<const Place> places, std::size_t most, uid_t user) {
+    if (++admissions <= 2) throw std::bad_alloc();
+    return admit(places, most, user);
+  };
+  start(options);
+  EXPECT_EQ(exchange(get_last), "");
+  EXPECT_EQ(exchange(get_last), "");
+  expect_alive();
+}
+
+TEST_F(ServerTest, AnExceptionInAConnectionClosesItAndNoOther) {
+  std::atomic<bool> fails = false;
+  ServerOptions options;
+  options.admit = [&](std::span<const Place> places, std::size_t most, uid_t user) {
+    if (fails) throw std::runtime_error("an oversight");
+    return admit(places, most, user);
+  };
+  start(options, 2);
+  for (int i = 0; i < 4; ++i) {
+    RawClient client(socket_.path());
+    client.send(get_hello);
+    client.read_until("/hello");
+    fails = true;  // a place for an event stream
+    client.send(get_events);
+    EXPECT_EQ(client.read_all(), "");
+    fails = false;
+    expect_alive();
+  }
+}
+
+TEST(Server, ABeatThatThrowsIsFollowedByOthers) {
+  std::atomic<int> beats = 0;
+  ServerOptions options;
+  options.beat_period = milliseconds(1);
+  Server server(options, {}, [&] {
+    if (++beats < 3) throw std::runtime_error("an oversight");
+  });
+  server.start();
+  while (beats < 5) std::this_thread::yield();
 }
 
 /// Answers to /wait come only once the test lets them.
