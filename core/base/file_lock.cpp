@@ -29,7 +29,7 @@ FileLock::FileLock(const std::filesystem::path& file, const std::string& owned) 
     if (result != 0 && errno == EWOULDBLOCK)
       refuse("is locked: another program uses " + owned + "; wait until it has ended");
     if (result != 0) refuse(std::string("cannot be locked: ") + std::strerror(errno));
-    // The former owner may have removed the file while this one waited at its door.
+    // The former owner may have removed the file after it was opened here: then another one is to be locked.
     struct stat named {};
     if (::stat(file.c_str(), &named) == 0 && named.st_ino == locked.st_ino && named.st_dev == locked.st_dev)
       return;
@@ -39,7 +39,7 @@ FileLock::FileLock(const std::filesystem::path& file, const std::string& owned) 
 }
 
 FileLock::~FileLock() {
-  (void)::unlink(file_.c_str());  // before the lock ends: who waits sees that the file is another one
+  (void)::unlink(file_.c_str());  // before the lock ends: whoever has opened it sees that it is removed
   ::close(fd_);
 }
 

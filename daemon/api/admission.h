@@ -26,7 +26,7 @@ struct Place {
 
 struct Admission {
   bool admitted = false;
-  std::optional<std::size_t> gives_way;  ///< index of the place that is closed for the newcomer
+  std::optional<std::size_t> evicted;  ///< index of the connection that is closed to admit the newcomer
 };
 
 /// Decides whether a newcomer of `user` gets one of `most` places.

@@ -43,7 +43,8 @@ class Server {
 
   /// Accepts clients on `socket`, which must outlive the server. Before `start`.
   /// @param most connections at once, ≥ 1; of these three quarters may be event streams. When there are more,
-  /// `ServerOptions::admit` says who gives way; one that is turned away gets 503 and costs nothing that lasts.
+  /// `ServerOptions::admit` says which one is closed; a client that is refused gets 503 and costs nothing
+  /// that lasts.
   void listen(const UnixSocket& socket, Access access, int most);
   void start();
   /// Wakes the event streams: call it after publishing. Thread-safe.

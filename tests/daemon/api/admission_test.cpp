@@ -21,21 +21,21 @@ TEST(Admission, EverybodyIsAdmittedWhileThereIsRoom) {
   const auto taken = places(anna, Use::streaming, 3);
   const Admission admission = admit(taken, 4, anna);
   EXPECT_TRUE(admission.admitted);
-  EXPECT_FALSE(admission.gives_way);
+  EXPECT_FALSE(admission.evicted);
 }
 
 TEST(Admission, AUserWithAllPlacesGivesOneToAnotherUser) {
   const auto taken = places(anna, Use::streaming, 4);
   const Admission admission = admit(taken, 4, ben);
   ASSERT_TRUE(admission.admitted);
-  EXPECT_EQ(admission.gives_way, 0U) << "the stream that was quiet longest";
+  EXPECT_EQ(admission.evicted, 0U) << "the stream that was quiet longest";
 }
 
 TEST(Admission, AnIdleConnectionGivesWayBeforeAStream) {
   auto taken = places(anna, Use::streaming, 3);
   taken.push_back({anna, Use::idle, 9});
   taken.push_back({anna, Use::idle, 8});
-  EXPECT_EQ(admit(taken, 5, ben).gives_way, 4U) << "the longest idle, though streams were quiet longer";
+  EXPECT_EQ(admit(taken, 5, ben).evicted, 4U) << "the longest idle, though streams were quiet longer";
 }
 
 TEST(Admission, ABusyConnectionIsNeverDropped) {
@@ -58,14 +58,14 @@ TEST(Admission, OneMoreThanAnotherIsAFairShareAndTwoMoreAreNot) {
   taken.push_back({ben, Use::streaming, 10});
   EXPECT_FALSE(admit(taken, 5, ben).admitted);
   taken.pop_back();
-  EXPECT_EQ(admit(taken, 4, ben).gives_way, 0U);
+  EXPECT_EQ(admit(taken, 4, ben).evicted, 0U);
 }
 
 TEST(Admission, AFullUserGivesUpItsOwnIdleConnectionButNoStream) {
   auto taken = places(anna, Use::streaming, 3);
   EXPECT_FALSE(admit(taken, 3, anna).admitted);
   taken.push_back({anna, Use::idle, 9});
-  EXPECT_EQ(admit(taken, 4, anna).gives_way, 3U);
+  EXPECT_EQ(admit(taken, 4, anna).evicted, 3U);
 }
 
 TEST(Admission, AnIdleConnectionOfAnotherUserIsKeptWhenItsShareIsSmaller) {
