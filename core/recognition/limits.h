@@ -17,6 +17,9 @@ struct RecognitionLimits {
   /// For the search in one region. The default has no effect, so that results depend on nothing but the
   /// picture.
   Duration region_time = Duration::max();
+  /// For the search in all regions of a picture together: a region gets what those before it have left. The
+  /// default has no effect.
+  Duration frame_time = Duration::max();
 };
 
 }  // namespace eigenpose

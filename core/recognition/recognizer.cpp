@@ -36,6 +36,15 @@ class Lap {
   TimePoint began_;
 };
 
+/// The limits of the next region, of a picture whose recognition began at `began`.
+RecognitionLimits left_of(const RecognitionLimits& limits, TimePoint began) {
+  RecognitionLimits left = limits;
+  if (limits.frame_time != Duration::max())
+    left.region_time = std::min(limits.region_time,
+                                std::max(Duration::zero(), limits.frame_time - (SteadyTime::now() - began)));
+  return left;
+}
+
 /// Whether two poses are within one and a half steps of the learned grid. The universal eigenspace chooses
 /// the basin, because it has seen all objects; the object's own eigenspace refines the pose within it.
 bool same_basin(const Manifold& manifold, const ClosestPoint& a, const ClosestPoint& b) {
@@ -280,6 +289,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, const Recog
   RecognitionTimes& spent = times != nullptr ? *times : local;
   spent = {};
   const Lap total(spent.total);
+  const TimePoint began = SteadyTime::now();
   Impl& impl = *impl_;
   if (image.empty() || (image.depth() != CV_8U && image.type() != CV_16UC1))
     throw std::invalid_argument("a picture is 8-bit grey, 8-bit BGR or 16-bit grey and not empty; got type " +
@@ -316,7 +326,7 @@ std::span<const Outcome> Recognizer::recognize(const cv::Mat& image, const Recog
       if (impl.refused(regions[i])) {
         outcome.verdict = regions[i].touches_border ? Verdict::touches_border : Verdict::too_small;
       } else {
-        impl.judge_region(image, i, limits);
+        impl.judge_region(image, i, left_of(limits, began));
         ++impl.column;
       }
     }

@@ -21,6 +21,7 @@ Watcher::Watcher(const WatcherOptions& options, const FrameHub& camera, const Mo
       models_(models),
       events_(events),
       region_time_(options.region_time),
+      frame_time_(options.frame_time),
       scene_(options.scene) {
   if (!options.enabled) return;
   pulse_ = heartbeat.join("watcher", watcher_look_limit);
@@ -111,8 +112,8 @@ void Watcher::report_settled(const Frame& frame, const std::stop_token& stop) {
   result.frame = {frame.sequence, frame.exposure_start};
   result.model = model_;
   RecognitionTimes times;
-  const std::span<const Outcome> outcomes =
-      recognizer_->recognize(frame.image, {.stop = stop, .region_time = region_time_}, &times);
+  const std::span<const Outcome> outcomes = recognizer_->recognize(
+      frame.image, {.stop = stop, .region_time = region_time_, .frame_time = frame_time_}, &times);
   if (stop.stop_requested()) return;  // what was found so far is not the whole scene
   result.outcomes.assign(outcomes.begin(), outcomes.end());
   result.times = times;

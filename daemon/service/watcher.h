@@ -23,6 +23,9 @@ struct WatcherOptions {
   bool enabled = true;
   /// For the search in one region: an outcome that took longer says that it is unfinished.
   Duration region_time = std::chrono::seconds(2);
+  /// For the search in all regions of a frame together. Well below the time that the watcher's thread has
+  /// between two beats (90 s), however much clutter stands there.
+  Duration frame_time = std::chrono::seconds(30);
   SceneChangeOptions scene;  ///< when a picture counts as settled
 };
 
@@ -73,6 +76,7 @@ class Watcher {
   const ModelStore& models_;
   EventSink& events_;
   const Duration region_time_;
+  const Duration frame_time_;
   Heartbeat::Pulse pulse_;  ///< beaten on the watcher's thread
   std::mutex looking_;      ///< held while a frame is looked at
   int pauses_ = 0;          ///< guarded by looking_

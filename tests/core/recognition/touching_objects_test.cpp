@@ -222,6 +222,23 @@ TEST(TouchingObjects, AreNotSplitWhereTheSearchIsStoppedAndTheOutcomeSaysSo) {
   EXPECT_EQ(recognize.recognize(scene).size(), 2U) << "limits hold for one call";
 }
 
+TEST(TouchingObjects, TheRegionsOfAPictureShareItsTime) {
+  Recognizer recognize(world().model);
+  const cv::Mat scene = touching(1, 55.0, 2, 120.0);
+  cv::Mat twice;
+  cv::vconcat(scene, scene, twice);
+  ASSERT_EQ(recognize.recognize(twice).size(), 4U) << "two regions of two objects";
+  RecognitionLimits limits;
+  limits.frame_time = Duration::zero();
+  const auto outcomes = recognize.recognize(twice, limits);
+  ASSERT_EQ(outcomes.size(), 2U);
+  for (const Outcome& outcome : outcomes) EXPECT_TRUE(outcome.unfinished);
+  limits.frame_time = std::chrono::hours(1);
+  EXPECT_EQ(recognize.recognize(twice, limits).size(), 4U);
+  limits.region_time = Duration::zero();
+  EXPECT_EQ(recognize.recognize(twice, limits).size(), 2U) << "a region has no more than its own time";
+}
+
 TEST(TouchingObjects, AreNotReportedWithoutEnoughEvidence) {
   const cv::Mat scene = touching(1, 55.0, 2, 120.0);
   Recognizer usual(world().model);

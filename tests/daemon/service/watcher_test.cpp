@@ -9,6 +9,7 @@
 #include "tests/daemon/event_keeper.h"
 #include "tests/daemon/fakes.h"
 #include "tests/support/learned_world.h"
+#include "tests/support/parts_world.h"
 
 namespace eigenpose::watcher_test {
 namespace {
@@ -185,6 +186,26 @@ TEST_F(WatcherTest, ACameraThatFailsInBetweenDoesNotEndTheWatching) {
   });
   show(*watcher, object(1, 30.0));
   EXPECT_EQ(events_.all<SceneResult>().back().outcomes.at(0).best->object, "one");
+}
+
+TEST_F(WatcherTest, AFrameFullOfClutterIsLookedAtForALimitedTime) {
+  testing::PartsWorld world;
+  models_.replace(world.model);
+  testing::SceneKnobs beside = testing::PartsWorld::knobs();
+  cv::Mat touching;
+  Segmenter segmenter(world.model->normalization.segmentation);
+  for (beside.x += 160.0; touching.empty() || segmenter.segment(touching).size() > 1; beside.x -= 2.0) {
+    touching = testing::scene_with(1, 55.0, testing::PartsWorld::knobs());
+    testing::draw_object(touching, 2, 120.0, beside);
+  }
+  options_.region_time = std::chrono::hours(1);
+  options_.frame_time = Duration::zero();
+  const auto watcher = this->watcher(events_);
+  show(*watcher, touching);
+  const auto seen = events_.all<SceneResult>();
+  ASSERT_EQ(seen.size(), 1U);
+  ASSERT_EQ(seen[0].outcomes.size(), 1U) << "they touch";
+  EXPECT_TRUE(seen[0].outcomes[0].unfinished);
 }
 
 TEST_F(WatcherTest, ThatIsTurnedOffLooksAtNothing) {
