@@ -86,6 +86,13 @@ json to_json(const LampStatus& lamp) {
           {"error", or_null(lamp.error)}};
 }
 
+json to_json(const LeftOutDetail& left_out) {
+  return {{"object", left_out.object},
+          {"whole_object", left_out.whole_object},
+          {"views", left_out.views},
+          {"reason", left_out.reason}};
+}
+
 json to_json(const JobResult& result) {
   if (const auto* acquired = std::get_if<AcquisitionResult>(&result))
     return {{"folder", acquired->folder.string()},
@@ -93,11 +100,14 @@ json to_json(const JobResult& result) {
             {"kept", acquired->kept},
             {"retaken", acquired->retaken},
             {"not_returned", or_null(acquired->not_returned)}};
-  if (const auto* learned = std::get_if<LearningResult>(&result))
+  if (const auto* learned = std::get_if<LearningResult>(&result)) {
+    json details = json::array();
+    for (const LeftOutDetail& detail : learned->left_out_details) details.push_back(to_json(detail));
     return {{"objects", learned->objects},       {"views", learned->views},
             {"components", learned->components}, {"energy", learned->energy},
             {"seconds", learned->time.count()},  {"file", learned->file.string()},
-            {"left_out", learned->left_out}};
+            {"left_out", learned->left_out},     {"left_out_details", std::move(details)}};
+  }
   return nullptr;
 }
 

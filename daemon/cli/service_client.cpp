@@ -5,11 +5,26 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/base/printable.h"
 #include "daemon/cli/command.h"
 #include "daemon/cli/console.h"
 
 namespace eigenpose::cli {
 namespace {
+
+/// What of learning's result a person has to know.
+void warn_of_left_out(const nlohmann::json& details) {
+  for (const nlohmann::json& detail : details) {
+    const std::string reason = printable(detail.at("reason").get<std::string>());
+    if (detail.at("whole_object").get<bool>())
+      std::fprintf(stderr, "warning: left out %s: %s\n", detail.at("object").get<std::string>().c_str(),
+                   reason.c_str());
+    else
+      std::fprintf(stderr, "warning: left out %zu views of %s, the first: %s\n",
+                   detail.at("views").get<std::size_t>(), detail.at("object").get<std::string>().c_str(),
+                   reason.c_str());
+  }
+}
 
 ApiClient client_on(const ServiceOptions& options, const char* name) {
   std::error_code ignored;
@@ -52,6 +67,7 @@ int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, 
     return exit_done;
   }
   const nlohmann::json& result = job.at("result");
+  warn_of_left_out(result.at("left_out_details"));
   std::printf("learned %zu objects from %zu views in %.1f s; the service watches with them now\n",
               result.at("objects").get<std::size_t>(), result.at("views").get<std::size_t>(),
               result.at("seconds").get<double>());

@@ -33,6 +33,14 @@ struct AcquisitionResult {
   std::optional<std::string> not_returned;
 };
 
+/// What learning has gone on without, of one object.
+struct LeftOutDetail {
+  std::string object;
+  bool whole_object = true;  ///< it is not in the model; else only some of its views are not
+  std::size_t views = 0;     ///< so many could not be used; 0 where none was looked at
+  std::string reason;        ///< what is wrong with the object, or with the first of the views
+};
+
 /// What learning has made.
 struct LearningResult {
   std::size_t objects = 0;
@@ -40,8 +48,12 @@ struct LearningResult {
   std::size_t components = 0;
   double energy = 0.0;  ///< share of the views' energy that the components keep, 0…1
   std::chrono::duration<double> time{};
-  std::filesystem::path file;         ///< of the model
-  std::vector<std::string> left_out;  ///< image sets that are incomplete or cannot be read
+  std::filesystem::path file;  ///< of the model
+  /// Objects that are not in the model, though they have an image set or stood in the former model; none that
+  /// was not asked for where objects were named. Ordered by name.
+  std::vector<std::string> left_out = {};
+  /// Why, and which objects were learned without some of their views.
+  std::vector<LeftOutDetail> left_out_details = {};
 };
 
 /// Nothing until the job is done.

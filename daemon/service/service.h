@@ -34,7 +34,7 @@ struct ObjectStatus {
     bool complete = false;
   };
   std::optional<Acquired> acquired;
-  std::optional<std::string> error;       ///< why its image set cannot be read
+  std::optional<std::string> error;       ///< why its image set cannot be read, or that there are two
   std::optional<std::size_t> learned_as;  ///< index into the model's objects
 };
 
@@ -96,8 +96,11 @@ class Service {
   /// The same with the configured plan of that name. @throws ServiceError (not_found) too.
   JobStatus acquire(const std::string& object, const std::string& plan_name);
   /// Starts learning the image sets that are named, or else all that are complete; the model is saved, then
-  /// swapped in. @throws ServiceError (invalid_request, busy; not_found, conflict: a set that is named is
-  /// missing or incomplete, or none is complete).
+  /// swapped in. The job fails as `conflict`, and the former model stays, where an object that is named, or
+  /// that the former model knows and has an image set, would not be in the new one; what else is left out
+  /// stands in its result. @throws ServiceError (invalid_request, busy; not_found; conflict: a set that is
+  /// named, or whose object the model in use knows, is incomplete, unreadable or there twice; none is
+  /// complete).
   JobStatus learn(const LearnRequest& request);
   /// Stops all motion now, then cancels the acquisition that runs. Never throws.
   void stop_motion() noexcept;

@@ -123,14 +123,29 @@ TEST(ApiJson, EveryFactOfAJobStandsUnderItsOwnKey) {
   EXPECT_EQ(to_json(job), expected);
   job.result = AcquisitionResult{"/s/mug", 21, 22, 23, "stuck"};
   EXPECT_EQ(to_json(job)["result"]["not_returned"], "stuck");
-  job.result = LearningResult{31, 32, 33, 0.75, std::chrono::duration<double>(4.5), "/s/model.h5", {"cup"}};
-  EXPECT_EQ(to_json(job)["result"], (json{{"objects", 31},
-                                          {"views", 32},
-                                          {"components", 33},
-                                          {"energy", 0.75},
-                                          {"seconds", 4.5},
-                                          {"file", "/s/model.h5"},
-                                          {"left_out", {"cup"}}}));
+}
+
+TEST(ApiJson, TheResultOfLearningSaysWhatWasLeftOutAndWhy) {
+  JobStatus job;
+  job.result = LearningResult{31,
+                              32,
+                              33,
+                              0.75,
+                              std::chrono::duration<double>(4.5),
+                              "/s/model.h5",
+                              {"cup"},
+                              {{"cup", true, 4, "too dark"}, {"mug", false, 2, "cut off"}}};
+  EXPECT_EQ(to_json(job)["result"],
+            (json{{"objects", 31},
+                  {"views", 32},
+                  {"components", 33},
+                  {"energy", 0.75},
+                  {"seconds", 4.5},
+                  {"file", "/s/model.h5"},
+                  {"left_out", {"cup"}},
+                  {"left_out_details",
+                   {{{"object", "cup"}, {"whole_object", true}, {"views", 4}, {"reason", "too dark"}},
+                    {{"object", "mug"}, {"whole_object", false}, {"views", 2}, {"reason", "cut off"}}}}}));
 }
 
 }  // namespace

@@ -3,11 +3,13 @@
 #include <fstream>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/input_file.h"
 #include "core/model/model_file.h"
 #include "tests/daemon/event_keeper.h"
 #include "tests/daemon/fakes.h"
@@ -67,6 +69,22 @@ class ServiceTest : public ::testing::Test {
     testing::SceneKnobs knobs;
     knobs.color = color;
     testing::write_turn(options_.image_sets, object, kind, 12, knobs);
+  }
+  /// Why learning is refused, or fails: what is kept of the sets may be a few seconds old.
+  Failure failure_of_learning(const LearnRequest& request) {
+    std::optional<Failure> failure;
+    const auto refused = refusal([&] { failure = ended(service().learn(request)).failure; });
+    return refused.value_or(failure.value_or(Failure{Fault::internal, "learned", ""}));
+  }
+  /// A complete set of views that all show the object at the picture's border.
+  void write_cut_off(const std::string& object) {
+    testing::SceneKnobs knobs;
+    knobs.x = 0.0;
+    testing::write_turn(options_.image_sets, object, 2, 12, knobs);
+  }
+  void copy_set(const std::string& from, const std::string& to) {
+    std::filesystem::copy(options_.image_sets / from, options_.image_sets / to,
+                          std::filesystem::copy_options::recursive);
   }
   /// An unfinished set of one view.
   void write_unfinished(const std::string& object, const Workspace& workspace) {
@@ -200,6 +218,132 @@ TEST_F(ServiceTest, LearnsTheCompleteSetsAndNamesThoseItLeavesOut) {
   EXPECT_FALSE(objects[1].acquired->complete);
   EXPECT_EQ(objects[2].learned_as, 0U);
   EXPECT_EQ(objects[3].learned_as, 1U);
+}
+
+TEST_F(ServiceTest, AnObjectOfWhichNoViewCanBeUsedStandsInTheResultWithTheReason) {
+  write_set("one", 1);
+  write_cut_off("mug");
+  const JobStatus job = ended(service().learn({}));
+  ASSERT_EQ(job.state, JobState::done) << job.failure.value_or(Failure{}).what;
+  const auto& result = std::get<LearningResult>(job.result);
+  EXPECT_EQ(result.objects, 1U);
+  EXPECT_THAT(result.left_out, ElementsAre("mug"));
+  ASSERT_EQ(result.left_out_details.size(), 1U);
+  EXPECT_EQ(result.left_out_details[0].object, "mug");
+  EXPECT_TRUE(result.left_out_details[0].whole_object);
+  EXPECT_EQ(result.left_out_details[0].views, 12U);
+  EXPECT_THAT(result.left_out_details[0].reason, HasSubstr("cut off by the border"));
+}
+
+TEST_F(ServiceTest, AnObjectThatIsNamedAndCannotBeLearnedFailsTheJobAndKeepsTheFormerModel) {
+  write_set("one", 1);
+  ASSERT_EQ(ended(service().learn({})).state, JobState::done);
+  const auto former = service().models().current();
+  const auto bytes = read_file(options_.model_file);
+  write_cut_off("mug");
+  for (const std::vector<std::string>& wanted : {std::vector<std::string>{"one", "mug"}, {"mug"}}) {
+    const JobStatus job = ended(service().learn({std::nullopt, wanted}));
+    ASSERT_EQ(job.state, JobState::failed) << wanted.size();
+    EXPECT_EQ(job.failure->fault, Fault::conflict);
+    EXPECT_THAT(job.failure->what, HasSubstr("\"mug\""));
+    EXPECT_THAT(job.failure->what, HasSubstr("cut off by the border"));
+  }
+  EXPECT_EQ(service().models().current(), former);
+  EXPECT_EQ(read_file(options_.model_file), bytes);
+}
+
+TEST_F(ServiceTest, AFormerlyLearnedObjectWhoseViewsCannotBeUsedIsNotLost) {
+  write_set("one", 1);
+  write_set("mug", 2);
+  ASSERT_EQ(ended(service().learn({})).state, JobState::done);
+  const auto former = service().models().current();
+  for (int i = 0; i < 12; ++i)
+    std::filesystem::resize_file(options_.image_sets / "mug" / fmt::format("{:06}.png", i), 100);
+  const JobStatus job = ended(service().learn({}));
+  ASSERT_EQ(job.state, JobState::failed);
+  EXPECT_EQ(job.failure->fault, Fault::conflict);
+  EXPECT_THAT(job.failure->what, HasSubstr("\"mug\""));
+  EXPECT_EQ(service().models().current(), former);
+  EXPECT_EQ(ended(service().learn({std::nullopt, {"one"}})).state, JobState::done)
+      << "what is left out by name may go";
+  EXPECT_EQ(service().models().current()->objects.size(), 1U);
+}
+
+TEST_F(ServiceTest, AFormerlyLearnedObjectWhoseSetCannotBeReadIsNotLost) {
+  write_set("one", 1);
+  write_set("mug", 2);
+  ASSERT_EQ(ended(service().learn({})).state, JobState::done);
+  std::ofstream(options_.image_sets / "mug" / "set.json") << "{";
+  const Failure refused = failure_of_learning({});
+  EXPECT_EQ(refused.fault, Fault::conflict);
+  EXPECT_THAT(refused.what, HasSubstr("would lose \"mug\""));
+  std::filesystem::remove_all(options_.image_sets / "mug");
+  const JobStatus job = ended(service().learn({}));
+  ASSERT_EQ(job.state, JobState::done) << "whoever removes the set means it";
+  EXPECT_THAT(std::get<LearningResult>(job.result).left_out, ElementsAre("mug"));
+  EXPECT_THAT(std::get<LearningResult>(job.result).left_out_details[0].reason, HasSubstr("no image set"));
+}
+
+TEST_F(ServiceTest, SingleViewsThatCannotBeUsedAreCountedInTheResult) {
+  write_set("one", 1);
+  for (const char* name : {"000000.png", "000005.png"})
+    std::filesystem::resize_file(options_.image_sets / "one" / name, 100);
+  const JobStatus job = ended(service().learn({std::nullopt, {"one"}}));
+  ASSERT_EQ(job.state, JobState::done) << job.failure.value_or(Failure{}).what;
+  const auto& result = std::get<LearningResult>(job.result);
+  EXPECT_EQ(result.views, 10U);
+  EXPECT_TRUE(result.left_out.empty()) << "the object itself is in the model";
+  ASSERT_EQ(result.left_out_details.size(), 1U);
+  EXPECT_FALSE(result.left_out_details[0].whole_object);
+  EXPECT_EQ(result.left_out_details[0].views, 2U);
+  EXPECT_THAT(result.left_out_details[0].reason, HasSubstr("000000.png"));
+}
+
+TEST_F(ServiceTest, ViewsAndOptionsThatDoNotSuitEachOtherAreAConflictAndNoDefect) {
+  write_cut_off("mug");
+  const JobStatus job = ended(service().learn({}));
+  ASSERT_EQ(job.state, JobState::failed);
+  EXPECT_EQ(job.failure->fault, Fault::conflict) << job.failure->what;
+}
+
+TEST_F(ServiceTest, TwoSetsOfOneObjectAreLeftOutByNameAndNeitherIsShown) {
+  write_set("one", 1);
+  write_set("mug", 2);
+  copy_set("mug", "mug2");
+  const JobStatus job = ended(service().learn({}));
+  ASSERT_EQ(job.state, JobState::done) << job.failure.value_or(Failure{}).what;
+  EXPECT_EQ(std::get<LearningResult>(job.result).objects, 1U);
+  EXPECT_THAT(std::get<LearningResult>(job.result).left_out, ElementsAre("mug"));
+  EXPECT_THAT(std::get<LearningResult>(job.result).left_out_details.at(0).reason, HasSubstr("mug, mug2"));
+  const std::vector<ObjectStatus> objects = service().objects();
+  ASSERT_EQ(objects.size(), 2U);
+  EXPECT_EQ(objects[0].name, "mug");
+  EXPECT_FALSE(objects[0].acquired);
+  EXPECT_THAT(objects[0].error.value_or(""), HasSubstr("mug, mug2"));
+  EXPECT_FALSE(objects[1].error);
+}
+
+TEST_F(ServiceTest, TwoSetsOfAnObjectThatIsNamedOrLearnedAreAConflict) {
+  write_set("one", 1);
+  write_set("mug", 2);
+  ASSERT_EQ(ended(service().learn({std::nullopt, {"one"}})).state, JobState::done);
+  copy_set("mug", "mug2");
+  const Failure named = failure_of_learning({std::nullopt, {"one", "mug"}});
+  EXPECT_EQ(named.fault, Fault::conflict);
+  EXPECT_THAT(named.what, HasSubstr("mug, mug2"));
+  copy_set("one", "another");
+  const Failure learned = failure_of_learning({});
+  EXPECT_EQ(learned.fault, Fault::conflict);
+  EXPECT_THAT(learned.what, HasSubstr("would lose \"one\""));
+}
+
+TEST_F(ServiceTest, AnObjectThatAnotherFolderHoldsIsNotAcquiredASecondTime) {
+  write_set("mug", 2);
+  std::filesystem::rename(options_.image_sets / "mug", options_.image_sets / "old");
+  const auto refused = refusal([&] { service().acquire("mug", "default"); });
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->fault, Fault::conflict);
+  EXPECT_THAT(refused->what, HasSubstr("\"old\""));
 }
 
 TEST_F(ServiceTest, WhatCannotBeLearnedIsRefusedBeforeAJobIsMade) {
