@@ -122,12 +122,14 @@ Answer get_latest(const Call& call) {
   if (!event)
     throw ServiceError(Fault::not_found, "there is no result yet",
                        "results come once a model is learned and the camera runs");
-  const NewestFrame newest =
-      sources.service.newest_frame();  // refused when it is too old: the scene may have changed
+  const Service& service = sources.service;
+  // Refused when it is too old: the scene may have changed. An acquisition has the camera to itself.
+  if (!service.watcher().status().paused) (void)service.newest_frame();
   json result = json::parse(*event->data);
-  const double seen = result.at("exposure_monotonic_s").get<double>();
-  const auto seconds = [](Duration duration) { return std::chrono::duration<double>(duration).count(); };
-  result["age_s"] = seconds(newest.age) + seconds(newest.frame.exposure_start.time_since_epoch()) - seen;
+  const std::chrono::duration<double> seen(result.at("exposure_monotonic_s").get<double>());
+  const Duration age = service.age_of(TimePoint(std::chrono::duration_cast<Duration>(seen)));
+  result["age_s"] = std::chrono::duration<double>(age).count();
+  result["current"] = service.is_current(result.at("frame_sequence").get<std::uint64_t>());
   return reply(result);
 }
 

@@ -53,6 +53,10 @@ int run_results(const ResultsOptions& options, const std::stop_token& stop) {
       std::printf("%s\n", result.dump(2).c_str());
     else
       print(result);
+    if (!result.value("current", true))
+      std::fprintf(stderr,
+                   "eigenpose: this result is not current: an acquisition runs, the camera is lost, or what "
+                   "stands there now was not recognised; 'eigenpose status' says which\n");
     return exit_done;
   }
   int printed = 0;

@@ -73,6 +73,8 @@ int print_status(const ServiceOptions& options) {
   else
     std::printf("model    %s\n",
                 text_or(status, "model_error", "none yet: acquire objects, then learn").c_str());
+  if (const std::string error = text_or(status.at("watch"), "error", ""); !error.empty())
+    std::printf("watch    FAULT: %s\n", error.c_str());
   for (const json& job : status.at("jobs"))
     std::printf("job      %s: %s %s %zu/%zu, since %s\n", job.at("id").get<std::string>().c_str(),
                 job.at("kind").get<std::string>().c_str(), text_or(job, "subject", "").c_str(),

@@ -383,10 +383,13 @@ std::vector<ObjectStatus> Service::objects() const {
 NewestFrame Service::newest_frame() const {
   std::optional<Frame> frame = camera_.latest();
   const std::optional<std::string> error = camera_.status().error;
-  const std::string hint = "`eigenpose status` shows the camera; try again when it runs";
+  const std::string hint =
+      watcher_.status().paused
+          ? "an acquisition takes pictures only where its plan needs one; try again when it has ended"
+          : "`eigenpose status` shows the camera; try again when it runs";
   if (!frame)
     throw ServiceError(Fault::unavailable, error.value_or("the camera has not taken a picture yet"), hint);
-  const Duration age = clock_.now() - frame->exposure_start;
+  const Duration age = age_of(frame->exposure_start);
   if (age > options_.stale_frame)
     throw ServiceError(
         Fault::unavailable,
@@ -394,6 +397,10 @@ NewestFrame Service::newest_frame() const {
                     error ? ": " : "", error.value_or("")),
         hint);
   return {*std::move(frame), age};
+}
+
+bool Service::is_current(std::uint64_t result_frame) const {
+  return watcher_.status().current_result == result_frame && !camera_.status().error;
 }
 
 ServiceActivity Service::activity() const {

@@ -3,6 +3,7 @@
 /// What eigenposed does, put together: devices, watching, jobs, and what the API may ask of them.
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -109,6 +110,11 @@ class Service {
   [[nodiscard]] std::vector<ObjectStatus> objects() const;
   /// @throws ServiceError (unavailable) when there is none, or it is older than `stale_frame`.
   [[nodiscard]] NewestFrame newest_frame() const;
+  /// Whether the result about that frame (FrameReference::sequence) says what the newest frame shows: the
+  /// last one published, while neither an acquisition nor a failure of camera or recognition came after it.
+  [[nodiscard]] bool is_current(std::uint64_t result_frame) const;
+  /// The time since a frame's exposure began.
+  [[nodiscard]] Duration age_of(TimePoint exposure_start) const { return clock_.now() - exposure_start; }
   /// Idle when watching is off or there is no model.
   [[nodiscard]] ServiceActivity activity() const;
 

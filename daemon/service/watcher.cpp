@@ -33,12 +33,17 @@ Watcher::~Watcher() = default;
 Watcher::Pause::Pause(Watcher& watcher) : watcher_(watcher) {
   const std::lock_guard lock(watcher_.looking_);
   ++watcher_.pauses_;
+  const std::lock_guard status_lock(watcher_.mutex_);
+  watcher_.status_.paused = true;
+  watcher_.status_.current_result.reset();
 }
 
 Watcher::Pause::~Pause() {
   const std::lock_guard lock(watcher_.looking_);
   --watcher_.pauses_;
   watcher_.look_anew_ = true;
+  const std::lock_guard status_lock(watcher_.mutex_);
+  watcher_.status_.paused = watcher_.pauses_ > 0;
 }
 
 WatchStatus Watcher::status() const {
@@ -70,10 +75,32 @@ void Watcher::note_failure(const std::exception& error) {
   const std::lock_guard lock(mutex_);
   if (status_.error != error.what()) spdlog::error("event=recognition_failed error=\"{}\"", error.what());
   status_.error = error.what();
+  status_.current_result.reset();
+}
+
+void Watcher::forget_result() {
+  const std::lock_guard lock(mutex_);
+  status_.current_result.reset();
+}
+
+void Watcher::publish(SceneResult result) {
+  const std::uint64_t frame = result.frame.sequence;
+  events_.publish(std::move(result));
+  const std::lock_guard lock(mutex_);
+  status_.current_result = frame;
+}
+
+SceneChange::Observation Watcher::observe(const Frame& frame) {
+  try {
+    return scene_.update(frame);
+  } catch (...) {
+    look_anew_ = true;  // what was known of the scene is of no use
+    throw;
+  }
 }
 
 void Watcher::look(const Frame& frame, const std::stop_token& stop) {
-  const SceneChange::Observation seen = scene_.update(frame);
+  const SceneChange::Observation seen = observe(frame);
   {
     const std::lock_guard lock(mutex_);
     ++status_.frames;
@@ -100,7 +127,7 @@ void Watcher::report_change(const Frame& frame) {
   result.state = SceneResult::State::changing;
   result.frame = {frame.sequence, frame.exposure_start};
   result.time = std::chrono::system_clock::now();
-  events_.publish(result);
+  publish(std::move(result));
 }
 
 void Watcher::report_settled(const Frame& frame, const std::stop_token& stop) {
@@ -108,6 +135,7 @@ void Watcher::report_settled(const Frame& frame, const std::stop_token& stop) {
   scene_.accept();
   settled_reported_ = true;
   fresh_model_ = false;
+  forget_result();
   SceneResult result;
   result.frame = {frame.sequence, frame.exposure_start};
   result.model = model_;
@@ -120,7 +148,7 @@ void Watcher::report_settled(const Frame& frame, const std::stop_token& stop) {
   result.time = std::chrono::system_clock::now();
   spdlog::info("event=result frame={} regions={} {}", frame.sequence, result.outcomes.size(),
                log_text(result));
-  events_.publish(std::move(result));
+  publish(std::move(result));
   const std::lock_guard lock(mutex_);
   ++status_.recognitions;
   status_.error.reset();

@@ -31,8 +31,12 @@ struct WatcherOptions {
 
 /// Counts since the start.
 struct WatchStatus {
-  std::uint64_t frames = 0;          ///< looked at for change
-  std::uint64_t recognitions = 0;    ///< settled scenes recognised
+  std::uint64_t frames = 0;        ///< looked at for change
+  std::uint64_t recognitions = 0;  ///< settled scenes recognised
+  /// The frame of the last result published, for as long as that result says what the newest frame shows.
+  /// None before the first, while paused and until a result after it, and from a failure on until a result.
+  std::optional<std::uint64_t> current_result;
+  bool paused = false;               ///< by a Watcher::Pause
   double flicker = 0.0;              ///< amplitude of the light's flicker, 0.05 is ±5 % (see SceneChange)
   std::optional<std::string> error;  ///< why the last one could not be
 };
@@ -66,10 +70,13 @@ class Watcher {
 
  private:
   void run(const std::stop_token& stop);
+  SceneChange::Observation observe(const Frame& frame);
   void look(const Frame& frame, const std::stop_token& stop);
   void report_change(const Frame& frame);
   void report_settled(const Frame& frame, const std::stop_token& stop);
   void use_model(std::shared_ptr<const Model> model);
+  void publish(SceneResult result);
+  void forget_result();
   void note_failure(const std::exception& error);
 
   const FrameHub& camera_;
@@ -80,7 +87,7 @@ class Watcher {
   Heartbeat::Pulse pulse_;  ///< beaten on the watcher's thread
   std::mutex looking_;      ///< held while a frame is looked at
   int pauses_ = 0;          ///< guarded by looking_
-  bool look_anew_ = false;  ///< guarded by looking_: there was a pause since the last look
+  bool look_anew_ = false;  ///< guarded by looking_: the standing scene is not the one last looked at
   mutable std::mutex mutex_;
   WatchStatus status_;  ///< guarded by mutex_
   // The rest is touched on the watcher's thread only.

@@ -16,21 +16,23 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/model/model_file.h"
 #include "daemon/api/errors.h"
 #include "daemon/api/event_publisher.h"
 #include "daemon/api/frame_jpeg.h"
 #include "daemon/api/target.h"
 #include "tests/daemon/fakes.h"
+#include "tests/support/learned_world.h"
 #include "tests/support/temporary_folder.h"
 
 namespace eigenpose {
 namespace {
 
 using nlohmann::json;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 const std::string deep = std::string(40, '[') + std::string(40, ']');
 
@@ -84,7 +86,7 @@ const std::vector<std::string> wrong_learning = {
     R"({"objects":"mug"})",         R"({"objects":[1]})",           R"({"objects":[]})",
     R"({"objects":["mug","mug"]})", R"({"objects":["../mug"]})",    R"({"objects":null})"};
 
-class Routes : public testing::Test {
+class Routes : public ::testing::Test {
  protected:
   Routes() { start(std::chrono::seconds(10)); }
   void start(Duration stale_frame) {
@@ -362,6 +364,59 @@ TEST_F(Routes, TheLatestResultSaysItsAgeAndRun) {
   EXPECT_EQ(result.at("run"), publisher_.results()->run());
   EXPECT_GE(result.at("age_s").get<double>(), 7.0);
   EXPECT_LT(result.at("age_s").get<double>(), 8.0 + 60.0);
+}
+
+/// The watcher looks at the grey picture of a table at rest, with a model of grey views: nothing stands
+/// there.
+class WatchedRoutes : public Routes {
+ protected:
+  WatchedRoutes() {
+    testing::SceneKnobs grey;
+    grey.color = false;
+    testing::write_turn(folder_.path() / "learned", "one", 1, 12, grey);
+    LearningOptions options = testing::small_learning();
+    options.normalization.color = false;
+    const auto sets = open_image_sets(folder_.path() / "learned");
+    save_model(learn(all_views(sets), options), folder_.path() / "lab.model");
+    start(std::chrono::seconds(3600));
+  }
+  json latest() {
+    const Response response = ask("GET", "/v1/results/latest");
+    return response.status == 200 ? json::parse(response.body) : json{{"current", response.status}};
+  }
+  void wait_for_current(bool current) {
+    while (latest().at("current") != current) std::this_thread::yield();
+  }
+};
+
+TEST_F(WatchedRoutes, TheLatestResultIsCurrentWhileTheWatcherSeesWhatItSays) {
+  wait_for_current(true);
+  const json settled = latest();
+  EXPECT_EQ(settled.at("state"), "settled");
+  publish_result(clock_.now());
+  EXPECT_EQ(latest().at("current"), false) << "the watcher has not published this one";
+}
+
+TEST_F(WatchedRoutes, TheLatestResultIsNotCurrentDuringAnAcquisition) {
+  wait_for_current(true);
+  const std::string id = running_job();
+  wait_for_current(false);
+  EXPECT_EQ(latest().at("state"), "settled") << "of the past";
+  ask("DELETE", "/v1/jobs/" + id);
+  EXPECT_EQ(ended(id).state, JobState::cancelled);
+  wait_for_current(true);
+}
+
+TEST_F(WatchedRoutes, AnAcquisitionThatTakesPicturesRarelyIsNoSilentCamera) {
+  start(Duration(-1));  // no frame is so young
+  while (publisher_.results()->latest("result") == std::nullopt) std::this_thread::yield();
+  EXPECT_EQ(ask("GET", "/v1/results/latest").status, 503);
+  const std::string id = running_job();
+  while (!service_->watcher().status().paused) std::this_thread::yield();
+  const Response response = ask("GET", "/v1/results/latest");
+  EXPECT_EQ(response.status, 200) << response.body;
+  EXPECT_EQ(json::parse(response.body).at("current"), false);
+  EXPECT_THAT(ask("GET", "/v1/frame.jpg").body, HasSubstr("an acquisition takes pictures only"));
 }
 
 TEST_F(Routes, ThePictureThatCannotBeEncodedIsAnErrorAndNoEmptyBody) {

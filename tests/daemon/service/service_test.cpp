@@ -435,7 +435,8 @@ TEST(ModelStoreTest, TheTroubleWithAFormerFileEndsWithANewModel) {
 /// A service of a camera alone, whose frames the test gives.
 class ServiceCameraTest : public ::testing::Test {
  protected:
-  ServiceCameraTest() {
+  ServiceCameraTest() { start(); }
+  void start() {
     ServiceOptions options;
     options.image_sets = folder_.path() / "sets";
     options.model_file = folder_.path() / "model.h5";
@@ -465,6 +466,30 @@ TEST_F(ServiceCameraTest, TheNewestFrameComesWithItsAgeAndAnOldOneIsAnError) {
   const auto stale = refusal([&] { (void)service_->newest_frame(); });
   EXPECT_EQ(stale->fault, Fault::unavailable);
   EXPECT_THAT(stale->what, HasSubstr("10 s old"));
+}
+
+TEST_F(ServiceCameraTest, AResultIsNotCurrentWhileTheCameraIsLost) {
+  service_.reset();
+  save_model(*testing::learned_world().model, folder_.path() / "model.h5");
+  start();
+  const cv::Mat scene = testing::scene_with(1, 30.0);
+  const auto show = [&] {
+    for (int i = 0; i < 10; ++i) {
+      clock_.advance(milliseconds(50));
+      const std::uint64_t looked_at = service_->watcher().status().frames;
+      script_.frame(scene, clock_.now());
+      eventually([&] { return service_->watcher().status().frames > looked_at; });
+    }
+  };
+  show();
+  const auto results = events_.first<SceneResult>(1);
+  const std::uint64_t frame = results.back().frame.sequence;
+  eventually([&] { return service_->watcher().status().current_result.has_value(); });
+  EXPECT_TRUE(service_->is_current(frame));
+  EXPECT_FALSE(service_->is_current(frame + 1));
+  script_.failure("unplugged");
+  eventually([&] { return service_->camera().status().error.has_value(); });
+  EXPECT_FALSE(service_->is_current(frame));
 }
 
 TEST_F(ServiceCameraTest, ThatTheCameraWasFoundAndLostAreEvents) {

@@ -188,6 +188,66 @@ TEST_F(WatcherTest, ACameraThatFailsInBetweenDoesNotEndTheWatching) {
   EXPECT_EQ(events_.all<SceneResult>().back().outcomes.at(0).best->object, "one");
 }
 
+TEST_F(WatcherTest, TheLastResultIsCurrentFromItsPublicationOn) {
+  use_model();
+  const auto watcher = this->watcher(events_);
+  EXPECT_FALSE(watcher->status().current_result) << "nothing was published yet";
+  show(*watcher, object(1, 30.0));
+  EXPECT_EQ(watcher->status().current_result, events_.all<SceneResult>().back().frame.sequence);
+  for (int i = 0; i < 4; ++i) step(*watcher, object(2, 40.0 * i));
+  ASSERT_EQ(events_.all<SceneResult>().back().state, State::changing);
+  EXPECT_EQ(watcher->status().current_result, events_.all<SceneResult>().back().frame.sequence);
+  show(*watcher, object(2, 120.0));
+  ASSERT_EQ(events_.all<SceneResult>().size(), 3U);
+  EXPECT_EQ(watcher->status().current_result, events_.all<SceneResult>().back().frame.sequence);
+}
+
+TEST_F(WatcherTest, NoResultIsCurrentWhilePausedNorUntilTheNextOne) {
+  use_model();
+  const auto watcher = this->watcher(events_);
+  show(*watcher, object(1, 30.0));
+  ASSERT_TRUE(watcher->status().current_result);
+  {
+    const Watcher::Pause pause(*watcher);
+    EXPECT_TRUE(watcher->status().paused);
+    EXPECT_FALSE(watcher->status().current_result);
+    { const Watcher::Pause second(*watcher); }
+    EXPECT_TRUE(watcher->status().paused) << "one pause is left";
+  }
+  EXPECT_FALSE(watcher->status().paused);
+  EXPECT_FALSE(watcher->status().current_result) << "nobody has looked since";
+  show(*watcher, object(1, 30.0));
+  EXPECT_EQ(watcher->status().current_result, events_.all<SceneResult>().back().frame.sequence);
+}
+
+TEST_F(WatcherTest, AResultIsNotCurrentOnceWhatStandsThereCouldNotBeRecognised) {
+  use_model();
+  const auto watcher = this->watcher(events_);
+  show(*watcher, object(1, 30.0));
+  const std::uint64_t before = watcher->status().current_result.value();
+  cv::Mat grey;
+  cv::extractChannel(object(2, 30.0), grey, 0);
+  show(*watcher, grey);
+  ASSERT_TRUE(watcher->status().error);
+  EXPECT_FALSE(watcher->status().current_result);
+  show(*watcher, object(1, 30.0));
+  EXPECT_GT(watcher->status().current_result.value_or(0), before);
+}
+
+TEST_F(WatcherTest, AFrameThatCannotBeLookedAtMakesTheSceneUnknownUntilItHasSettledAgain) {
+  use_model();
+  const auto watcher = this->watcher(events_);
+  show(*watcher, object(1, 30.0));
+  ASSERT_EQ(events_.all<SceneResult>().size(), 1U);
+  exposure_ += milliseconds(50);
+  script_.frame(cv::Mat(), exposure_);
+  eventually([&] { return watcher->status().error.has_value(); });
+  EXPECT_FALSE(watcher->status().current_result);
+  show(*watcher, object(1, 30.0));
+  ASSERT_EQ(events_.all<SceneResult>().size(), 2U) << "the same scene, looked at anew";
+  EXPECT_TRUE(watcher->status().current_result);
+}
+
 TEST_F(WatcherTest, AFrameFullOfClutterIsLookedAtForALimitedTime) {
   testing::PartsWorld world;
   models_.replace(world.model);
