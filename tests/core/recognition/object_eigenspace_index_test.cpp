@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/image/appearance_maker.h"
 #include "core/image/segmentation.h"
 #include "tests/support/learned_world.h"
 
