@@ -365,7 +365,7 @@ struct Server::Impl {
 
   /// @param member ends with the coroutine, also where that never begins.
   asio::awaitable<void> serve(Membership member, Listener& listener) {
-    const ConnectionPointer connection = member.connection();
+    const ConnectionPointer& connection = member.connection();
     RequestReader reader(options.limits);
     for (bool keep_alive = true; keep_alive;) {
       note_use(listener, *connection, reader.has_begun() ? Place::Use::busy : Place::Use::idle);
