@@ -99,7 +99,7 @@ auto from_body(const Request& request, const std::vector<std::string_view>& allo
 }
 
 std::string object_name(const json& value, std::string_view key) {
-  const std::string name = json_text(value, key);
+  std::string name = json_text(value, key);
   try {
     check_object_name(name);
   } catch (const std::invalid_argument& wrong) {
