@@ -53,15 +53,15 @@ ApiClient commanding_client(const ServiceOptions& options) {
 }
 
 nlohmann::json run_job(const ServiceOptions& options, std::string_view target, const nlohmann::json& body,
-                       std::stop_token stop) {
+                       const std::stop_token& stop) {
   const ApiClient client = commanding_client(options);
   const nlohmann::json job = client.post(target, body);
   ConsoleProgress progress;
-  return client.wait_for_job(job.at("id").get<std::string>(), progress.callback(), std::move(stop));
+  return client.wait_for_job(job.at("id").get<std::string>(), progress.callback(), stop);
 }
 
-int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, std::stop_token stop) {
-  const nlohmann::json job = run_job(options, "/v1/learn", body, std::move(stop));
+int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, const std::stop_token& stop) {
+  const nlohmann::json job = run_job(options, "/v1/learn", body, stop);
   if (options.json) {
     std::printf("%s\n", job.dump(2).c_str());
     return exit_done;

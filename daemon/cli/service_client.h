@@ -33,11 +33,11 @@ ApiClient commanding_client(const ServiceOptions& options);
 
 /// Posts a job, shows its progress until it ends, and cancels it on `stop`. @return the job.
 nlohmann::json run_job(const ServiceOptions& options, std::string_view target, const nlohmann::json& body,
-                       std::stop_token stop);
+                       const std::stop_token& stop);
 
 /// `eigenpose learn` without a folder: the running service learns what it has acquired and swaps the model
 /// in.
 /// @param body of the request: components, objects. @return the exit code.
-int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, std::stop_token stop);
+int learn_at_service(const ServiceOptions& options, const nlohmann::json& body, const std::stop_token& stop);
 
 }  // namespace eigenpose::cli

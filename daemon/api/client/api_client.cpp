@@ -153,7 +153,7 @@ json ApiClient::ask_json(std::string_view method, std::string_view target, const
 }
 
 void ApiClient::follow(std::string_view target, const std::function<bool(const ApiEvent&)>& handle,
-                       std::stop_token stop) const {
+                       const std::stop_token& stop) const {
   Connection connection(socket_, timeout_);
   connection.send("GET", target, "");
   http::response_parser<http::buffer_body> parser;
@@ -178,7 +178,8 @@ void ApiClient::follow(std::string_view target, const std::function<bool(const A
   }
 }
 
-json ApiClient::wait_for_job(const std::string& id, const Progress& progress, std::stop_token stop) const {
+json ApiClient::wait_for_job(const std::string& id, const Progress& progress,
+                             const std::stop_token& stop) const {
   constexpr std::chrono::milliseconds period{100};
   const SteadyClock clock;
   for (;;) {

@@ -53,12 +53,12 @@ class ApiClient {
 
   /// Reads a stream of events until `handle` returns false, the service ends it, or `stop` is requested.
   void follow(std::string_view target, const std::function<bool(const ApiEvent&)>& handle,
-              std::stop_token stop = {}) const;
+              const std::stop_token& stop = {}) const;
 
   /// Waits for a job to end. @return the job. @throws ApiError when it failed or was cancelled; Interrupted
   /// on `stop`, and then the job has been cancelled too, unless it ended at that moment: then as without.
   nlohmann::json wait_for_job(const std::string& id, const Progress& progress = {},
-                              std::stop_token stop = {}) const;
+                              const std::stop_token& stop = {}) const;
 
  private:
   struct Reply {
