@@ -150,7 +150,7 @@ struct Grids {
 
 /// Computes the orientation grids of all views; takes the background level off, which goes into the model.
 Grids compute_grids(const std::vector<PartsViews>& objects, const PartsLearningOptions& options,
-                    const std::stop_token& stop, PartsModel& model) {
+                    WorkMeter& meter, PartsModel& model) {
   Grids result;
   std::size_t views = 0;
   for (const PartsViews& object : objects) {
@@ -158,13 +158,12 @@ Grids compute_grids(const std::vector<PartsViews>& objects, const PartsLearningO
     views += object.count;
   }
   result.grids.resize(views);
-  const Progress silent;
-  WorkMeter meter(silent, stop, "computing orientations", objects.size());
   parallel_for(objects.size(), options.threads, [&](std::size_t o) {
     meter.check_stop();
     OrientationGridMaker mapper;
     for (std::size_t v = 0; v < objects[o].count; ++v)
       mapper.compute(objects[o].view(v), result.grids[result.first[o] + v]);
+    meter.finished(1);
   });
   model.background = background_level(result.grids);
   for (OrientationGrid& grid : result.grids) take_off(model.background, grid);
@@ -214,7 +213,8 @@ PartsModel learn_parts(const std::vector<PartsViews>& objects, const PartsLearni
   model.view_poses.resize(count);
   if (model.bands == 3) model.colors.resize(count);
 
-  Grids grids = compute_grids(objects, options, stop, model);
+  WorkMeter orientations_meter(progress, stop, "computing orientations", count);
+  Grids grids = compute_grids(objects, options, orientations_meter, model);
   model.space = WindowSpace::learn(grids.grids, options.threads);
   WorkMeter windows_meter(progress, stop, "learning windows", count);
   auto windows = project_windows(objects, grids, options, windows_meter, model);

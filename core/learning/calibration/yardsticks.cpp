@@ -127,17 +127,17 @@ double half_step_share(const std::vector<ObjectRecord>& objects) {
 }
 
 void measure_windows(const PartsModel& parts, const TrainingViews& views, const YardstickOptions& options,
-                     const std::stop_token& stop, Yardsticks& yardsticks) {
+                     const Progress& progress, const std::stop_token& stop, Yardsticks& yardsticks) {
   const std::size_t stride = (views.count() + most_scored - 1) / most_scored;
   std::vector<ObjectRecord>& objects = yardsticks.records;
-  const Progress silent;
-  const WorkMeter meter(silent, stop, "calibrating windows", objects.size());
+  WorkMeter meter(progress, stop, "calibrating windows", objects.size());
   parallel_for(objects.size(), options.threads, [&](std::size_t o) {
     meter.check_stop();
     const std::size_t voting = (views.objects()[o].count + stride - 1) / stride;
     if (objects[o].votes.votes.size() != voting ||
         (!parts.colors.empty() && objects[o].votes.colors.size() != voting))
       objects[o].votes = vote_for_own_views(parts, views, o, options, stride);
+    meter.finished(1);
   });
   yardsticks.half_step = half_step_share(objects);
   for (const ObjectRecord& own : objects) {
@@ -183,7 +183,7 @@ Yardsticks measure_yardsticks(const Model& model, const TrainingViews& views, co
     result.typical_distance.push_back(std::sqrt(mean(squared)));
     result.squared.push_back(std::move(squared));
   }
-  if (model.parts) measure_windows(*model.parts, views, options, stop, result);
+  if (model.parts) measure_windows(*model.parts, views, options, progress, stop, result);
   return result;
 }
 

@@ -1,5 +1,9 @@
 #include "core/learning/learning.h"
 
+#include <map>
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
@@ -213,6 +217,22 @@ TEST_F(Learning, IsTheLearningOfTheViewsThatAreLeft) {
     EXPECT_EQ(model.parts->extents[o], expected.parts->extents[o]);
     EXPECT_EQ(model.rejection_distance(o), expected.rejection_distance(o));
   }
+}
+
+TEST_F(Learning, ReportsEachStageThatTakesLongObjectByObject) {
+  testing::write_turn(root(), "one", 1, 12);
+  testing::write_turn(root(), "two", 2, 12);
+  const auto sets = open_image_sets(root());
+  LearningOptions options = testing::small_learning();
+  options.parts = true;
+  std::map<std::string, std::vector<std::size_t>> heard;  // one call at a time
+  (void)learn(all_views(sets), options, nullptr, [&](const ProgressUpdate& update) {
+    EXPECT_GE(update.total, update.done);
+    heard[std::string(update.stage)].push_back(update.done);
+  });
+  for (const char* stage : {"computing orientations", "learning windows", "learning alignment",
+                            "calibrating distances", "calibrating windows"})
+    EXPECT_THAT(heard[stage], ElementsAre(1U, 2U)) << stage;
 }
 
 TEST_F(Learning, LeavesOutViewsFromDiskAsFromMemory) {
