@@ -104,9 +104,8 @@ MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, cons
       }
       clock.sleep_until(std::min(deadline, now + order.patience.poll_interval), stop);
     }
-  } catch (const Interrupted&) {
-    steps.halt();
-    throw;
+  } catch (const Interrupted& interrupted) {
+    throw Interrupted(std::string(interrupted.what()) + "; " + steps.halt());
   } catch (const DeviceTimeout& failure) {
     rethrow_with(failure, steps.halt());
   } catch (const DeviceLost& failure) {
@@ -117,6 +116,13 @@ MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, cons
       throw Interrupted(failure.device() + ": " + failure.operation() + ": interrupted on request; " +
                         consequence);
     rethrow_with(failure, consequence);
+  } catch (const std::exception& failure) {
+    // No memory, no thread, no folder for a claim: the motor is told to stop all the same.
+    const std::string cause = failure.what();
+    throw DeviceError(order.device, order.operation, cause + "; " + steps.halt());
+  } catch (...) {
+    steps.halt();
+    throw;
   }
 }
 

@@ -78,8 +78,8 @@ ModbusAxis::~ModbusAxis() {
   if (!may_be_moving_) return;
   try {
     send_stop(clock_.now() + stop_patience);
-  } catch (const Error&) {
-    // Nobody is left to tell; the drive's own watchdog is armed where there is one.
+  } catch (const std::exception&) {
+    // Nobody is left to report to; the drive's own watchdog is armed where there is one.
   }
 }
 
@@ -177,7 +177,7 @@ void ModbusAxis::stop_motion() {
 std::string ModbusAxis::stop_after_failure() {
   try {
     send_stop(clock_.now() + stop_patience);
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     return fmt::format(
         "the drive could NOT be told to stop ({}); {}", error.what(),
         watchdog_armed_
@@ -187,7 +187,7 @@ std::string ModbusAxis::stop_after_failure() {
   }
   try {
     disarm_watchdog("stop", clock_.now() + stop_patience);
-  } catch (const Error&) {
+  } catch (const std::exception&) {
     // Then it raises an alarm of silence, which the next motion clears.
   }
   return "the drive was told to stop";

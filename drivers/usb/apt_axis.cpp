@@ -68,8 +68,8 @@ AptAxis::~AptAxis() {
   if (!may_be_moving_) return;
   try {
     send_stop(clock_.now() + stop_patience);
-  } catch (const Error&) {
-    // Nobody is left to tell.
+  } catch (const std::exception&) {
+    // Nobody is left to report to.
   }
 }
 
@@ -240,7 +240,7 @@ std::string AptAxis::stop_after_failure() {
   try {
     send_stop(clock_.now() + stop_patience);
     return "the controller was told to stop";
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     return fmt::format(
         "the controller could NOT be told to stop ({}); it may still be moving until it is there",
         error.what());

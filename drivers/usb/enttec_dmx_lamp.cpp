@@ -142,7 +142,7 @@ EnttecDmxLamp::~EnttecDmxLamp() {
   if (!may_be_lit_) return;
   try {
     show(0.0, clock_.now() + std::chrono::seconds(2));
-  } catch (const Error&) {
+  } catch (const std::exception&) {
     // Nobody is left to report to.
   }
 }

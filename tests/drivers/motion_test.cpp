@@ -3,6 +3,8 @@
 #include "drivers/motion.h"
 
 #include <limits>
+#include <new>
+#include <system_error>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -202,7 +204,7 @@ class ScriptedDrive {
             .halt =
                 [this] {
                   ++halts;
-                  return std::string("the drive was told to stop");
+                  return consequence;
                 }};
   }
   MotionReading run(const std::stop_token& stop = {}) {
@@ -212,6 +214,7 @@ class ScriptedDrive {
   ManualClock clock{begin};
   std::function<void()> on_read;
   bool start_failure = false;
+  std::string consequence = "the drive was told to stop";
   int starts = 0;
   int finishes = 0;
   int halts = 0;
@@ -278,6 +281,39 @@ TEST(CarryOut, AStopDuringTheMotionTellsTheDriveToStop) {
   std::stop_source stop;
   drive.on_read = [&] { stop.request_stop(); };
   EXPECT_THROW((void)drive.run(stop.get_token()), Interrupted);
+  EXPECT_EQ(drive.halts, 1);
+}
+
+TEST(CarryOut, AnInterruptedMotionSaysWhatBecameOfTheMotor) {
+  ScriptedDrive drive({moving_at(10.0), moving_at(20.0), standing_at(30.0)});
+  drive.consequence = "the drive could NOT be told to stop; use its emergency stop";
+  const RunningClock time(drive.clock);
+  std::stop_source stop;
+  drive.on_read = [&] { stop.request_stop(); };
+  EXPECT_EQ(failure_of<Interrupted>([&] { (void)drive.run(stop.get_token()); }),
+            "table: move to 30 deg: interrupted on request; the drive could NOT be told to stop; use its "
+            "emergency stop");
+}
+
+TEST(CarryOut, AFailureThatIsNoDevicesOwnStopsTheMotorTooAndSaysSo) {
+  const std::vector<std::function<void()>> failures = {
+      [] { throw std::bad_alloc(); },
+      [] { throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again)); },
+      [] { throw Error("no folder for the claims of devices"); },
+      [] { throw FileError("/run/claim", "is not there"); },
+  };
+  for (const std::function<void()>& fail : failures) {
+    ScriptedDrive drive({moving_at(10.0), standing_at(30.0)});
+    drive.on_read = fail;
+    EXPECT_THAT(failure_of([&] { (void)drive.run(); }),
+                AllOf(StartsWith("table: move to 30 deg: " + failure_of<std::exception>(fail)),
+                      HasSubstr("; the drive was told to stop")));
+    EXPECT_EQ(drive.halts, 1);
+    EXPECT_EQ(drive.finishes, 0);
+  }
+  ScriptedDrive drive({moving_at(10.0)});
+  drive.on_read = [] { throw 7; };
+  EXPECT_THROW((void)drive.run(), int);
   EXPECT_EQ(drive.halts, 1);
 }
 
