@@ -26,8 +26,20 @@ void MotionGate::interrupt() {
   if (current_ != nullptr) current_->request_stop();
 }
 
+void MovementTracker::add(double position, TimePoint now) {
+  // Two counts, the smallest tolerance of a driver, may be read as a little more after the arithmetic.
+  constexpr double beyond_rounding = 1.25;
+  if (!stretch_ || std::abs(position - stretch_->newest) > beyond_rounding * tolerance_)
+    stretch_ = {position, position, position};
+  else if (position < stretch_->low || position > stretch_->high)
+    stretch_ = {std::min(position, stretch_->low), std::max(position, stretch_->high), position};
+  else
+    return;
+  last_movement_ = now;
+}
+
 MotionWatch::MotionWatch(MotionOrder order, TimePoint now)
-    : order_(std::move(order)), start_(now), last_change_(now), still_since_(now) {}
+    : order_(std::move(order)), start_(now), movement_(order_.tolerance, now), still_since_(now) {}
 
 std::string MotionWatch::in_words(double position) const {
   return fmt::format("{:.3f} {}", order_.dof.canonical(position), order_.dof.unit);
@@ -47,12 +59,11 @@ bool MotionWatch::stands_at_goal(const MotionReading& reading, TimePoint now) co
 
 bool MotionWatch::arrived(const MotionReading& reading, TimePoint now, TimePoint deadline) {
   if (reading.alarm) fail("alarm: " + *reading.alarm);
-  if (!last_position_ || *last_position_ != reading.position) last_change_ = now;
-  last_position_ = reading.position;
+  movement_.add(reading.position, now);
 
   if (reading.moving) {
     moving_ = moved_at_all_ = true;
-    if (now - last_change_ >= order_.patience.stall_time)
+    if (now - movement_.last_movement() >= order_.patience.stall_time)
       fail("the motor is stuck at " + in_words(reading.position));
   } else {
     if (moving_) still_since_ = now;

@@ -51,7 +51,7 @@ struct MotionPatience {
   Duration start_time = std::chrono::milliseconds(500);
   /// Within this time a motor that has stopped is at its target.
   Duration settle_time = std::chrono::milliseconds(500);
-  /// A moving motor whose position does not change for this time is stuck.
+  /// A moving motor that gets nowhere for this time is stuck.
   Duration stall_time = std::chrono::seconds(2);
 };
 
@@ -78,6 +78,28 @@ struct MotionOrder {
   MotionPatience patience;
 };
 
+/// Finds when an axis last got anywhere. An encoder that dithers by a count or two about one place gets
+/// nowhere; a motor that turns ever so slowly does. So a position counts as movement where it lies beyond all
+/// positions since the last turning point, or has turned back by more than the tolerance. Value type.
+class MovementTracker {
+ public:
+  /// @param tolerance of arrival, in the axis's unit: no less than what an encoder dithers by.
+  MovementTracker(double tolerance, TimePoint now) : tolerance_(tolerance), last_movement_(now) {}
+  /// @param position not canonical.
+  void add(double position, TimePoint now);
+  [[nodiscard]] TimePoint last_movement() const { return last_movement_; }
+
+ private:
+  struct Stretch {
+    double low;     ///< least position since the last turning point
+    double high;    ///< greatest position since then
+    double newest;  ///< the position of the last movement
+  };
+  double tolerance_;
+  TimePoint last_movement_;
+  std::optional<Stretch> stretch_;
+};
+
 /// Judges one motion by its readings. Lives on one thread.
 class MotionWatch {
  public:
@@ -94,11 +116,10 @@ class MotionWatch {
 
   MotionOrder order_;
   TimePoint start_;
-  TimePoint last_change_;
+  MovementTracker movement_;
   TimePoint still_since_;
   bool moving_ = false;
   bool moved_at_all_ = false;
-  std::optional<double> last_position_;
 };
 
 /// What a driver does in the course of one motion.

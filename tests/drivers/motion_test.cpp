@@ -134,6 +134,44 @@ TEST(MotionWatch, AMotorThatMovesAndGetsNowhereIsStuckAfterTheStallTime) {
               HasSubstr("stuck at 11.000 deg"));
 }
 
+/// When a moving motor is called stuck whose position is `position_at` of the time since the beginning, read
+/// every 100 ms for a minute at most.
+Duration stuck_after(const std::function<double(Duration)>& position_at) {
+  MotionWatch watch(move_to_30(), begin);
+  for (Duration t = 100ms; t <= 60s; t += 100ms) {
+    try {
+      EXPECT_FALSE(watch.arrived(moving_at(position_at(t)), begin + t, far_away));
+    } catch (const DeviceError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("stuck at"));
+      return t;
+    }
+  }
+  return Duration::max();
+}
+
+TEST(MotionWatch, AMotorThatDithersAboutOnePlaceIsStuck) {
+  for (const double counts : {1.0, 2.0}) {
+    const double step = 0.05;  // the tolerance is two of them
+    int reading = 0;
+    const auto dithering = [&](Duration t) {
+      if (t < 1s) return 10.0 + std::chrono::duration<double>(t).count();
+      return 10.9 + (++reading % 2 == 0 ? counts * step : 0.0);
+    };
+    EXPECT_LE(stuck_after(dithering), 1s + 200ms + 2s) << counts;
+  }
+}
+
+TEST(MotionWatch, AMotorThatTurnsBackIsNotStuckBeforeItStandsStill) {
+  // Backlash compensation: past the target, and slowly back over the same way; then jammed.
+  const auto there_and_back = [](Duration t) {
+    const double seconds = std::chrono::duration<double>(t).count();
+    if (seconds <= 5.0) return 20.0 + 4.0 * seconds;
+    return std::max(32.0, 40.0 - 0.8 * (seconds - 5.0));
+  };
+  EXPECT_GE(stuck_after(there_and_back), 15s + 2s - 200ms);
+  EXPECT_LE(stuck_after(there_and_back), 15s + 2s + 100ms);
+}
+
 TEST(MotionWatch, ASlowMotorIsNotStuck) {
   MotionWatch watch(move_to_30(), begin);
   for (int i = 1; i <= 20; ++i)
