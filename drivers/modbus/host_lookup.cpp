@@ -91,23 +91,39 @@ void HostLookup::start() {
     if (state_->running) return;
     state_->running = true;
   }
-  // Detached, because nothing can end a look-up; it touches only what it shares.
-  std::thread([state = state_, host = host_, resolver = resolver_] {
-    std::vector<std::string> found;
-    std::string problem = "it has no address";
-    try {
-      found = resolver(host);
-    } catch (const std::exception& error) {
-      problem = error.what();
-    }
+  try {
+    // Detached, because nothing can end a look-up; it touches only what it shares.
+    std::thread([state = state_, host = host_, resolver = resolver_] {
+      look_up_for(*state, host, resolver);
+    }).detach();
+  } catch (const std::exception& error) {
     {
-      const std::lock_guard lock(state->mutex);
-      state->running = false;
-      if (!found.empty()) state->addresses = std::move(found);
-      state->problem = std::move(problem);
+      const std::lock_guard lock(state_->mutex);
+      state_->running = false;
     }
-    state->ended.notify_all();
-  }).detach();
+    state_->ended.notify_all();
+    throw std::runtime_error(fmt::format(
+        "the name \"{}\" cannot be looked up: {}; end programs that are not needed, or give the address as "
+        "numbers",
+        host_, error.what()));
+  }
+}
+
+void HostLookup::look_up_for(State& state, const std::string& host, const Resolver& resolver) {
+  std::vector<std::string> found;
+  std::string problem = "it has no address";
+  try {
+    found = resolver(host);
+  } catch (const std::exception& error) {
+    problem = error.what();
+  }
+  {
+    const std::lock_guard lock(state.mutex);
+    state.running = false;
+    if (!found.empty()) state.addresses = std::move(found);
+    state.problem = std::move(problem);
+  }
+  state.ended.notify_all();
 }
 
 std::vector<std::string> HostLookup::addresses(Duration patience) {
@@ -129,7 +145,12 @@ std::vector<std::string> HostLookup::addresses(Duration patience) {
 }
 
 void HostLookup::refresh() {
-  if (!is_numeric_host(host_)) start();
+  if (is_numeric_host(host_)) return;
+  try {
+    start();
+  } catch (const std::runtime_error&) {
+    // What was found before stays; whoever needs more asks again.
+  }
 }
 
 }  // namespace eigenpose

@@ -32,7 +32,8 @@ class HostLookup {
   explicit HostLookup(std::string host, Resolver resolver = resolve_by_system);
 
   /// At once when `host` is numeric or was found before, otherwise after `patience` at the latest.
-  /// @throws std::runtime_error in words when it is not found, or not in time; the next call asks again.
+  /// @throws std::runtime_error in words when it is not found, not in time, or cannot be looked up; the next
+  /// call asks again.
   [[nodiscard]] std::vector<std::string> addresses(Duration patience);
 
   /// Looks the name up again, for the next connection. Returns at once; until then what was found stays.
@@ -40,7 +41,10 @@ class HostLookup {
 
  private:
   struct State;
+  /// Begins a look-up unless one is under way. @throws std::runtime_error when no thread can be started.
   void start();
+  /// On the look-up's thread.
+  static void look_up_for(State& state, const std::string& host, const Resolver& resolver);
 
   std::string host_;
   Resolver resolver_;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include <arpa/inet.h>
@@ -203,6 +204,30 @@ class NameServer {
   };
   std::shared_ptr<State> state_ = std::make_shared<State>();
 };
+
+/// A resolver that cannot be handed to a thread as long as there is none to be had.
+struct ThreadlessResolver {
+  explicit ThreadlessResolver(std::shared_ptr<bool> flag) : no_thread(std::move(flag)) {}
+  ThreadlessResolver(const ThreadlessResolver& other) : no_thread(other.no_thread) {
+    if (*no_thread) throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again));
+  }
+  ThreadlessResolver& operator=(const ThreadlessResolver&) = delete;
+  ~ThreadlessResolver() = default;
+  std::vector<std::string> operator()(const std::string&) const { return {"192.0.2.1"}; }
+  std::shared_ptr<bool> no_thread;
+};
+
+TEST(HostLookup, WithoutAThreadSaysSoAndLooksUpAgainOnceThereIsOne) {
+  const auto no_thread = std::make_shared<bool>(false);
+  HostLookup lookup("drives.lab", ThreadlessResolver(no_thread));
+  *no_thread = true;
+  for (int attempt = 0; attempt < 2; ++attempt)
+    EXPECT_THAT(failure_of<std::runtime_error>([&] { (void)lookup.addresses(20s); }),
+                AllOf(HasSubstr("\"drives.lab\" cannot be looked up"), HasSubstr("unavailable")));
+  EXPECT_NO_THROW(lookup.refresh());
+  *no_thread = false;
+  EXPECT_THAT(lookup.addresses(20s), testing::ElementsAre("192.0.2.1"));
+}
 
 TEST(ModbusBusNameLookup, IsWaitedForUntilTheDeadlineAndByAStopNotAtAll) {
   NameServer names;
