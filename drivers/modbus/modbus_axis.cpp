@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -50,6 +49,7 @@ ModbusAxis::ModbusAxis(ModbusProfile profile, ModbusAxisOptions options, std::sh
   if (!bus_) throw std::invalid_argument("axis " + options_.name + ": no Modbus bus");
   profile_.check();
   check(options_);
+  counter_ = counter_range(profile_);
   info_.dof = options_.dof;
   info_.model = profile_.model;
   info_.resolution = 1.0 / options_.steps_per_unit;
@@ -93,10 +93,19 @@ std::int64_t ModbusAxis::steps_of(double position) const {
   return std::llround((options_.reversed ? -from_home : from_home) * options_.steps_per_unit);
 }
 
+void ModbusAxis::check_counter(const std::string& operation, std::int64_t steps) const {
+  if (counter_.contains(steps)) return;
+  throw DeviceError(options_.name, operation,
+                    fmt::format("that is {} steps, and the drive counts from {} to {}; home the axis, or set "
+                                "fewer steps per {}",
+                                steps, counter_.least, counter_.most, options_.dof.unit));
+}
+
 RegisterFill ModbusAxis::motion_fill() const {
   const double steps_per_s = options_.speed * options_.steps_per_unit;
   const double steps_per_s2 = options_.acceleration * options_.steps_per_unit;
   RegisterFill fill;
+  fill.position_is_signed = profile_.position.is_signed;
   fill.speed = std::llround(
       profile_.speed_unit == SpeedUnit::rpm ? steps_per_s / profile_.steps_per_turn * 60.0 : steps_per_s);
   fill.acceleration = std::llround(profile_.acceleration_unit == AccelerationUnit::ms_per_1000rpm
@@ -329,10 +338,11 @@ double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token 
   RegisterFill fill = motion_fill();
   // The drive counts on over whole turns; the way to go is the short one from where it is.
   fill.position = steps_of(nearest_target(dof, position, before.position));
-  if (std::abs(fill.position) > std::numeric_limits<std::int32_t>::max() && dof.periodic) {
+  if (!counter_.contains(fill.position) && dof.periodic) {
     // The counter is at its end: the long way, once in a lifetime.
     fill.position = steps_of(dof.canonical(position));
   }
+  check_counter(operation, fill.position);
   const MotionReading after =
       run(MotionOrder::Goal::target, operation, {profile_.move, fill}, deadline, motion.token());
   return dof.canonical(after.position);

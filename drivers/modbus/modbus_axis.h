@@ -100,12 +100,15 @@ class ModbusAxis final : public Axis {
   [[nodiscard]] double position_of(std::int64_t steps) const;
   [[nodiscard]] std::int64_t steps_of(double position) const;
   [[nodiscard]] RegisterFill motion_fill() const;
+  /// @throws DeviceError when the drive cannot count so far.
+  void check_counter(const std::string& operation, std::int64_t steps) const;
 
   ModbusProfile profile_;
   ModbusAxisOptions options_;
   std::shared_ptr<ModbusBus> bus_;
   const Clock& clock_;
   AxisInfo info_;
+  RegisterRange counter_;  ///< the steps that the drive can count
   std::vector<Block> status_blocks_;
   std::uint64_t set_up_connection_ = 0;  ///< the connection on which `connect` was written
   bool watchdog_armed_ = false;

@@ -66,6 +66,19 @@ std::int64_t filled(const RegisterValue& value, const RegisterFill& fill) {
   return 0;
 }
 
+RegisterRange range_of(const RegisterValue& value, const RegisterFill& fill) {
+  switch (value.meaning) {
+    case RegisterMeaning::constant:
+      return {register_range(value.bits, true).least, register_range(value.bits, false).most};
+    case RegisterMeaning::position:
+      return register_range(value.bits, fill.position_is_signed);
+    case RegisterMeaning::distance:
+      return register_range(value.bits, true);
+    default:
+      return register_range(value.bits, false);
+  }
+}
+
 }  // namespace
 
 void ModbusProfile::check() const {
@@ -102,6 +115,9 @@ void ModbusLampProfile::check() const {
   check_writes(model, "set_level", set_level);
   if (!mentions(set_level, RegisterMeaning::level)) refuse(model, "the set_level command writes no level");
   if (full < 1) refuse(model, fmt::format("full = {} is not above 0", full));
+  const int bits = register_of(set_level, RegisterMeaning::level)->bits;
+  if (!register_range(bits, false).contains(full))
+    refuse(model, fmt::format("full = {} does not fit the {} bits of the level", full, bits));
 }
 
 std::string ModbusProfile::describe_alarm(std::int64_t code) const {
@@ -115,13 +131,39 @@ bool ModbusProfile::is_silence_alarm(std::int64_t code) const {
   return std::find(silence_alarms.begin(), silence_alarms.end(), code) != silence_alarms.end();
 }
 
+std::optional<RegisterNumber> register_of(const RegisterWrites& writes, RegisterMeaning meaning) {
+  for (const RegisterWrite& write : writes) {
+    int offset = 0;
+    for (const RegisterValue& value : write.values) {
+      if (value.meaning == meaning)
+        return RegisterNumber{static_cast<std::uint16_t>(write.address + offset), value.bits, false};
+      offset += value.bits / 16;
+    }
+  }
+  return std::nullopt;
+}
+
+RegisterRange register_range(int bits, bool is_signed) {
+  const std::int64_t span = std::int64_t{1} << bits;
+  return is_signed ? RegisterRange{-span / 2, span / 2 - 1} : RegisterRange{0, span - 1};
+}
+
+RegisterRange counter_range(const ModbusProfile& profile) {
+  RegisterRange range = register_range(profile.position.bits, profile.position.is_signed);
+  for (const RegisterWrite& write : profile.move)
+    for (const RegisterValue& value : write.values) {
+      if (value.meaning != RegisterMeaning::position) continue;
+      const RegisterRange target = register_range(value.bits, profile.position.is_signed);
+      range = {std::max(range.least, target.least), std::min(range.most, target.most)};
+    }
+  return range;
+}
+
 std::vector<std::uint16_t> encode(const RegisterWrite& write, WordOrder order, const RegisterFill& fill) {
   std::vector<std::uint16_t> registers;
   for (const RegisterValue& value : write.values) {
     const std::int64_t number = filled(value, fill);
-    // A register holds either a signed or an unsigned number; which of the two is the drive's business.
-    const std::int64_t span = std::int64_t{1} << value.bits;
-    if (number < -span / 2 || number >= span)
+    if (!range_of(value, fill).contains(number))
       throw std::out_of_range(
           fmt::format("{} does not fit {} bits (register block {:#06x})", number, value.bits, write.address));
     const auto raw = static_cast<std::uint32_t>(number);

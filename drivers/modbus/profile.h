@@ -128,9 +128,13 @@ struct ModbusProfile {
   [[nodiscard]] bool is_silence_alarm(std::int64_t code) const;
 };
 
+/// Where the first value of `meaning` stands when `writes` are done; nothing if none of them has it.
+std::optional<RegisterNumber> register_of(const RegisterWrites& writes, RegisterMeaning meaning);
+
 /// What the driver fills in for each meaning.
 struct RegisterFill {
   std::int64_t position = 0;
+  bool position_is_signed = true;  ///< as the drive's own count is, RegisterNumber::is_signed
   std::int64_t distance = 0;
   std::int64_t speed = 0;
   std::int64_t acceleration = 0;
@@ -138,7 +142,22 @@ struct RegisterFill {
   std::int64_t level = 0;
 };
 
-/// The registers of one write, in the drive's word order.
+/// The numbers that registers can hold, both ends included.
+struct RegisterRange {
+  std::int64_t least = 0;
+  std::int64_t most = 0;
+
+  [[nodiscard]] bool contains(std::int64_t number) const { return least <= number && number <= most; }
+};
+
+/// Of a number of so many bits, 16 or 32.
+RegisterRange register_range(int bits, bool is_signed);
+
+/// The counts that the drive can both be sent to by the profile's `move` and show as its position.
+RegisterRange counter_range(const ModbusProfile& profile);
+
+/// The registers of one write, in the drive's word order. A position is signed or not as `fill` says, a
+/// distance always signed, a constant a pattern of bits; the others are never negative.
 /// @throws std::out_of_range when a value does not fit its bits.
 std::vector<std::uint16_t> encode(const RegisterWrite& write, WordOrder order, const RegisterFill& fill);
 

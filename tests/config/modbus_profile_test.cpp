@@ -225,5 +225,55 @@ TEST(ModbusRegisters, ANumberThatDoesNotFitIsNotCutOff) {
                std::out_of_range);
 }
 
+/// Whether `number` can be written to a value of so many bits.
+bool fits(RegisterMeaning meaning, int bits, std::int64_t number, bool position_is_signed = true) {
+  RegisterFill fill;
+  fill.position_is_signed = position_is_signed;
+  fill.position = fill.distance = fill.speed = fill.acceleration = fill.watchdog = fill.level = number;
+  try {
+    (void)encode({1, {{meaning, number, bits}}}, WordOrder::high_first, fill);
+    return true;
+  } catch (const std::out_of_range&) {
+    return false;
+  }
+}
+
+TEST(ModbusRegisters, EachMeaningHasTheRangeOfItsOwnSign) {
+  for (const int bits : {16, 32}) {
+    const std::int64_t span = std::int64_t{1} << bits;
+    for (const RegisterMeaning meaning : {RegisterMeaning::position, RegisterMeaning::distance}) {
+      EXPECT_TRUE(fits(meaning, bits, -span / 2) && fits(meaning, bits, span / 2 - 1)) << bits;
+      EXPECT_FALSE(fits(meaning, bits, -span / 2 - 1) || fits(meaning, bits, span / 2)) << bits;
+    }
+    EXPECT_TRUE(fits(RegisterMeaning::position, bits, span - 1, false));
+    EXPECT_FALSE(fits(RegisterMeaning::position, bits, -1, false) ||
+                 fits(RegisterMeaning::position, bits, span, false));
+    EXPECT_FALSE(fits(RegisterMeaning::distance, bits, span / 2, false)) << "a distance has a sign always";
+    for (const RegisterMeaning meaning : {RegisterMeaning::speed, RegisterMeaning::acceleration,
+                                          RegisterMeaning::watchdog, RegisterMeaning::level}) {
+      EXPECT_TRUE(fits(meaning, bits, 0) && fits(meaning, bits, span - 1)) << bits;
+      EXPECT_FALSE(fits(meaning, bits, -1) || fits(meaning, bits, span)) << bits;
+    }
+    EXPECT_TRUE(fits(RegisterMeaning::constant, bits, -span / 2) &&
+                fits(RegisterMeaning::constant, bits, span - 1));
+    EXPECT_FALSE(fits(RegisterMeaning::constant, bits, -span / 2 - 1) ||
+                 fits(RegisterMeaning::constant, bits, span));
+  }
+}
+
+TEST(ModbusRegisters, TheCounterEndsWhereTheNarrowerOfTargetAndPositionEnds) {
+  ModbusProfile profile;
+  profile.move = {{1, {{RegisterMeaning::constant, 7, 16}, {RegisterMeaning::position, 0, 16}}}};
+  EXPECT_EQ(counter_range(profile).least, -32768);
+  EXPECT_EQ(counter_range(profile).most, 32767);
+  profile.position.is_signed = false;
+  EXPECT_EQ(counter_range(profile).least, 0);
+  EXPECT_EQ(counter_range(profile).most, 65535);
+  profile.move = {{1, {{RegisterMeaning::position, 0, 32}}}};
+  EXPECT_EQ(counter_range(profile).most, 4294967295);
+  profile.position.bits = 16;
+  EXPECT_EQ(counter_range(profile).most, 65535);
+}
+
 }  // namespace
 }  // namespace eigenpose
