@@ -34,6 +34,10 @@ struct AxisState {
   std::optional<std::string> alarm;  ///< in words, when the drive raises one
 };
 
+/// @throws std::out_of_range naming the axis when `position` is not a number in the range of `dof`, both ends
+/// included.
+void check_target(const std::string& axis, const Dof& dof, double position);
+
 /// How far an axis that does not know where it is may be moved in one go, in its unit.
 double longest_unhomed_jog(const Dof& dof);
 
@@ -61,11 +65,12 @@ class Axis {
   virtual double move_to(double position, TimePoint deadline, std::stop_token stop) = 0;
 
   /// Moves by `distance` (in the unit) from where the axis stands and waits for arrival: the operator's hand,
-  /// not the acquisition's. Here by `move_to`; a driver whose device moves by a distance itself also moves an
-  /// axis that is not homed, to free it, by `longest_unhomed_jog` at most, since its limits are not known
-  /// then.
+  /// not the acquisition's. A periodic axis turns in the direction of the distance, by a whole turn at most.
+  /// Here by `move_to`, which goes the short way round: by less than half a turn. A driver whose device moves
+  /// by a distance itself also moves an axis that is not homed, to free it, by `longest_unhomed_jog` at most,
+  /// since its limits are not known then.
   /// @return the position read back. @throws std::out_of_range when it would end outside the range or turn
-  /// further than the range is long; otherwise like `move_to`.
+  /// further than the range is long or, here, half a turn; otherwise like `move_to`.
   virtual double jog(double distance, TimePoint deadline, std::stop_token stop);
 
   /// Tells the drive to stop now, and makes a `move_to`, `jog` or `home` under way on another thread end with

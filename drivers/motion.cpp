@@ -6,8 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "drivers/axis.h"
-
 namespace eigenpose {
 
 MotionGate::Passage::Passage(MotionGate& gate, const std::stop_token& caller)
@@ -139,12 +137,6 @@ MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, cons
 
 double nearest_target(const Dof& dof, double position, double from) {
   return dof.periodic ? from + dof.difference(position, from) : position;
-}
-
-void check_target(const std::string& device, const Dof& dof, double position) {
-  if (!(position >= dof.lower && position <= dof.upper))
-    throw std::out_of_range(
-        fmt::format("{}: {} {} is outside {} … {}", device, position, dof.unit, dof.lower, dof.upper));
 }
 
 void check_jog(const std::string& device, const Dof& dof, double distance) {

@@ -13,6 +13,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/workspace.h"
+#include "drivers/axis.h"
 
 namespace eigenpose {
 
@@ -141,10 +142,6 @@ MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, cons
 /// Where to send a drive that counts on over whole turns: the position congruent to `position` that is
 /// nearest to `from`, on a periodic axis; `position` itself on another.
 double nearest_target(const Dof& dof, double position, double from);
-
-/// @throws std::out_of_range naming the axis when `position` is not a number in the range of `dof`, both ends
-/// included.
-void check_target(const std::string& device, const Dof& dof, double position);
 
 /// @throws std::out_of_range when `distance` is not a number or longer than the range of `dof`.
 void check_jog(const std::string& device, const Dof& dof, double distance);

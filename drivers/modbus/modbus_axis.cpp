@@ -349,13 +349,15 @@ double ModbusAxis::move_to(double position, TimePoint deadline, std::stop_token 
 }
 
 double ModbusAxis::jog(double distance, TimePoint deadline, std::stop_token stop) {
-  if (profile_.jog.empty()) return Axis::jog(distance, deadline, std::move(stop));
   const Dof& dof = options_.dof;
   check_jog(options_.name, dof, distance);
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = fmt::format("jog by {} {}", distance, dof.unit);
   if (motion.token().stop_requested()) throw Interrupted();
   const Reading before = read_ready_to_move(operation, AlarmHandling::refuse, deadline, motion.token());
+  const bool by_distance = !profile_.jog.empty();
+  if (!before.homed && !by_distance)
+    throw DeviceError(options_.name, operation, "not homed; home the axis first");
   if (!before.homed)
     check_unhomed_jog(options_.name, dof, distance);
   else if (!dof.periodic)
@@ -364,8 +366,10 @@ double ModbusAxis::jog(double distance, TimePoint deadline, std::stop_token stop
   RegisterFill fill = motion_fill();
   fill.distance = std::llround((options_.reversed ? -distance : distance) * options_.steps_per_unit);
   fill.position = before.steps + fill.distance;
-  const MotionReading after = run(MotionOrder::Goal::target, operation, {profile_.jog, fill, Sending::once},
-                                  deadline, motion.token());
+  check_counter(operation, fill.position);
+  const Command command =
+      by_distance ? Command{profile_.jog, fill, Sending::once} : Command{profile_.move, fill};
+  const MotionReading after = run(MotionOrder::Goal::target, operation, command, deadline, motion.token());
   return dof.canonical(after.position);
 }
 

@@ -54,6 +54,7 @@ class ModbusAxis final : public Axis {
   void home(TimePoint deadline, std::stop_token stop) override;
   double move_to(double position, TimePoint deadline, std::stop_token stop) override;
   /// By the profile's own jog where it has one; that is sent once only, since twice would be twice as far.
+  /// Otherwise by a move to where the drive's count then stands, which keeps the direction too.
   double jog(double distance, TimePoint deadline, std::stop_token stop) override;
   void stop_motion() override;
 

@@ -307,18 +307,39 @@ void AptAxis::home(TimePoint deadline, std::stop_token stop) {
       motion.token());
 }
 
+MotionReading AptAxis::read_ready_to_move(const std::string& operation, TimePoint deadline) {
+  MotionReading reading = read_at_rest(operation, AlarmHandling::refuse, deadline);
+  if (!reading.homed) throw DeviceError(options_.name, operation, "not homed; home the axis first");
+  return reading;
+}
+
+double AptAxis::move_count_to(double position, const std::string& operation, TimePoint deadline,
+                              const std::stop_token& stop) {
+  const std::int32_t counts = counts_of(operation, position);
+  const MotionReading after =
+      run(order(MotionOrder::Goal::target, operation, position_of(counts)),
+          apt::move_absolute(options_.channel, counts, options_.controller), deadline, stop);
+  return options_.dof.canonical(after.position);
+}
+
 double AptAxis::move_to(double position, TimePoint deadline, std::stop_token stop) {
   check_target(options_.name, options_.dof, position);
   const MotionGate::Passage motion(gate_, stop);
   const std::string operation = fmt::format("move to {} {}", position, options_.dof.unit);
   if (motion.token().stop_requested()) throw Interrupted();
-  const MotionReading before = read_at_rest(operation, AlarmHandling::refuse, deadline);
-  if (!before.homed) throw DeviceError(options_.name, operation, "not homed; home the axis first");
-  const std::int32_t counts = counts_of(operation, nearest_target(options_.dof, position, before.position));
-  const MotionReading after =
-      run(order(MotionOrder::Goal::target, operation, position_of(counts)),
-          apt::move_absolute(options_.channel, counts, options_.controller), deadline, motion.token());
-  return options_.dof.canonical(after.position);
+  const MotionReading before = read_ready_to_move(operation, deadline);
+  return move_count_to(nearest_target(options_.dof, position, before.position), operation, deadline,
+                       motion.token());
+}
+
+double AptAxis::jog(double distance, TimePoint deadline, std::stop_token stop) {
+  check_jog(options_.name, options_.dof, distance);
+  const MotionGate::Passage motion(gate_, stop);
+  const std::string operation = fmt::format("jog by {} {}", distance, options_.dof.unit);
+  if (motion.token().stop_requested()) throw Interrupted();
+  const MotionReading before = read_ready_to_move(operation, deadline);
+  if (!options_.dof.periodic) check_target(options_.name, options_.dof, before.position + distance);
+  return move_count_to(before.position + distance, operation, deadline, motion.token());
 }
 
 }  // namespace eigenpose

@@ -49,6 +49,9 @@ class AptAxis final : public Axis {
   AxisState state(TimePoint deadline) override;
   void home(TimePoint deadline, std::stop_token stop) override;
   double move_to(double position, TimePoint deadline, std::stop_token stop) override;
+  /// By a move to where the controller's count then stands, which keeps the direction. Not on an axis that is
+  /// not homed.
+  double jog(double distance, TimePoint deadline, std::stop_token stop) override;
   void stop_motion() override;
 
  private:
@@ -60,6 +63,11 @@ class AptAxis final : public Axis {
   MotionReading run(const MotionOrder& order, std::span<const std::uint8_t> command, TimePoint deadline,
                     const std::stop_token& stop);
   MotionReading read_at_rest(const std::string& operation, AlarmHandling alarms, TimePoint deadline);
+  /// @throws DeviceError on an alarm and on an axis that is not homed.
+  MotionReading read_ready_to_move(const std::string& operation, TimePoint deadline);
+  /// @param position not canonical. @return the position read back, canonical.
+  double move_count_to(double position, const std::string& operation, TimePoint deadline,
+                       const std::stop_token& stop);
   void forget_faults(const std::string& operation, TimePoint deadline);
   void send_stop(TimePoint deadline);
   std::string stop_after_failure();

@@ -192,6 +192,22 @@ TEST(AptAxisOptionsAtWork, ALinearRangeIsNotLeftByAJog) {
   EXPECT_NEAR(rig.axis().jog(5.0, soon(), {}), 40.0, 0.05) << "up to the end";
 }
 
+TEST(AptAxisOptionsAtWork, AJogTurnsInItsDirectionByAWholeTurnAtMost) {
+  for (const bool reversed : {false, true}) {
+    const double sign = reversed ? -1.0 : 1.0;
+    AptOptionsRig rig([&](AptAxisOptions& o) { o.reversed = reversed; });
+    rig.axis().home(soon(), {});
+    EXPECT_NEAR(rig.axis().jog(270.0, soon(), {}), 270.0, 0.05);
+    EXPECT_NEAR(sign * rig.true_position(), 270.0, 0.05);
+    EXPECT_NEAR(rig.axis().jog(360.0, soon(), {}), 270.0, 0.05);
+    EXPECT_NEAR(sign * rig.true_position(), 630.0, 0.05);
+    EXPECT_NEAR(rig.axis().jog(-252.0, soon(), {}), 18.0, 0.05);
+    EXPECT_NEAR(sign * rig.true_position(), 378.0, 0.05);
+    EXPECT_THROW(rig.axis().jog(361.0, soon(), {}), std::out_of_range);
+    EXPECT_NEAR(sign * rig.true_position(), 378.0, 0.05);
+  }
+}
+
 TEST(AptAxisOptionsAtWork, AMotionErrorIsAnAlarmWithoutTheControllersWords) {
   AptOptionsRig rig;
   rig.axis().home(soon(), {});

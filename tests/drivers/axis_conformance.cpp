@@ -154,6 +154,36 @@ TEST_P(AxisConformance, JogsByADistanceFromWhereItStands) {
   }
 }
 
+TEST_P(AxisConformance, JogsInTheDirectionOfTheDistanceByMoreThanHalfATurnToo) {
+  const Dof dof = axis().info().dof;
+  if (!dof.periodic) GTEST_SKIP() << "this axis does not close on itself";
+  home();
+  for (const double distance : {0.7 * dof.period(), -0.7 * dof.period()}) {
+    bool done = false;
+    for (int attempt = 0; attempt < 10 && !done; ++attempt) {
+      const double before = rig().true_position();
+      double astray = 0.0;  // how far it was seen outside the way to go
+      Background jog([&](const std::stop_token& stop) { axis().jog(distance, soon(), stop); });
+      while (!jog.done()) {
+        // From where it began, in the direction of the distance: 0 … a whole turn.
+        const double way =
+            std::fmod(std::copysign(1.0, distance) * (rig().true_position() - before) + 2.0 * dof.period(),
+                      dof.period());
+        astray = std::max(astray, std::min(way - std::abs(distance), dof.period() - way));
+      }
+      EXPECT_LE(astray, tolerance()) << "distance " << distance;
+      try {
+        jog.finish();
+        EXPECT_LE(std::abs(difference(rig().true_position(), before + distance)), tolerance());
+        done = true;
+      } catch (const DeviceError&) {
+        // What a faulty line may do to it; the next attempt begins where it was stopped.
+      }
+    }
+    EXPECT_TRUE(done) << "distance " << distance;
+  }
+}
+
 TEST_P(AxisConformance, RefusesToJogBeyondItsRange) {
   home();
   const Dof dof = axis().info().dof;

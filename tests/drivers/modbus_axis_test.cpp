@@ -191,6 +191,51 @@ TEST_F(ModbusAxisTest, AReversedAxisIsJoggedAndReadTheOtherWay) {
   EXPECT_NEAR(axis.state(soon()).position, 15.0, 0.05);
 }
 
+TEST_F(ModbusAxisTest, ADriveThatOnlyKnowsPositionsJogsInTheDirectionOfTheDistance) {
+  SteadyClock clock;
+  ModbusProfile profile = oriental_motor_az_profile();
+  profile.jog.clear();
+  ModbusAxis axis(profile, rig_.options(), rig_.bus(), clock);
+  EXPECT_THAT(failure_of([&] { axis.jog(1.0, soon(), {}); }), HasSubstr("not homed"));
+  axis.home(soon(), {});
+  EXPECT_NEAR(axis.jog(252.0, soon(), {}), 252.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), 252.0, 0.05);
+  EXPECT_NEAR(axis.jog(360.0, soon(), {}), 252.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), 612.0, 0.05);
+  EXPECT_NEAR(axis.jog(-270.0, soon(), {}), 342.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), 342.0, 0.05);
+}
+
+/// The AZ profile as of a drive that counts in 16 bits.
+ModbusProfile profile_that_counts_in_16_bits() {
+  ModbusProfile profile = oriental_motor_az_profile();
+  profile.position.address += 1;  // the lower word
+  profile.position.bits = 16;
+  return profile;
+}
+
+TEST_F(ModbusAxisTest, ATargetBeyondTheDrivesOwnCounterIsReachedTheLongWayOrRefused) {
+  SteadyClock clock;
+  ModbusAxis axis(profile_that_counts_in_16_bits(), rig_.options(), rig_.bus(), clock);
+  axis.home(soon(), {});
+  EXPECT_NEAR(axis.move_to(170.0, soon(), {}), 170.0, 0.05);
+  EXPECT_NEAR(axis.move_to(300.0, soon(), {}), 300.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), 300.0, 0.05) << "30000 steps of 32767";
+  EXPECT_NEAR(axis.move_to(40.0, soon(), {}), 40.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), 40.0, 0.05) << "40000 steps would be beyond: the long way";
+  EXPECT_NEAR(axis.move_to(320.0, soon(), {}), 320.0, 0.05);
+  EXPECT_NEAR(rig_.unwrapped_position(), -40.0, 0.05);
+  EXPECT_THAT(failure_of([&] { axis.jog(-290.0, soon(), {}); }),
+              testing::AllOf(HasSubstr("-33000 steps"), HasSubstr("from -32768 to 32767")));
+  EXPECT_NEAR(rig_.unwrapped_position(), -40.0, 0.05) << "nothing was moved";
+
+  ModbusAxisOptions slide = rig_.options();
+  slide.dof = {"slide", "mm", -100.0, 500.0, false};
+  ModbusAxis linear(profile_that_counts_in_16_bits(), slide, rig_.bus(), clock);
+  EXPECT_THAT(failure_of([&] { linear.move_to(400.0, soon(), {}); }), HasSubstr("that is 40000 steps"));
+  EXPECT_NEAR(rig_.unwrapped_position(), -40.0, 0.05);
+}
+
 TEST_F(ModbusAxisTest, AMotorLeftMovingIsStoppedBeforeItIsMoved) {
   rig_.axis().home(soon(), {});
   rig_.turn_steadily(3.0);

@@ -451,5 +451,23 @@ TEST(AxisJog, IsAMoveByTheDistanceFromWhereTheAxisStands) {
   EXPECT_THAT(failure_of([&] { linear.jog(1.0, far_away, {}); }), HasSubstr("not homed"));
 }
 
+TEST(AxisJog, ByPositionsAloneRefusesWhatTheShortWayWouldTurnTheOtherWay) {
+  for (const double refused : {180.0, -180.0, 0.7 * 360.0, -0.7 * 360.0, 360.0, -360.0}) {
+    MoveOnlyAxis axis(turntable);
+    axis.now = {.position = 10.0, .moving = false, .homed = true, .alarm = {}};
+    EXPECT_THAT(failure_of<std::out_of_range>([&] { axis.jog(refused, far_away, {}); }),
+                HasSubstr("less than 180 deg at a time"))
+        << refused;
+    EXPECT_EQ(axis.target, -1.0) << "nothing was moved";
+  }
+  MoveOnlyAxis axis(turntable);
+  axis.now = {.position = 10.0, .moving = false, .homed = true, .alarm = {}};
+  EXPECT_DOUBLE_EQ(axis.jog(179.0, far_away, {}), 189.0);
+  EXPECT_DOUBLE_EQ(axis.jog(-179.0, far_away, {}), 191.0);
+  MoveOnlyAxis linear(slide);
+  linear.now = {.position = -5.0, .moving = false, .homed = true, .alarm = {}};
+  EXPECT_DOUBLE_EQ(linear.jog(50.0, far_away, {}), 45.0) << "more than half of a range that does not close";
+}
+
 }  // namespace
 }  // namespace eigenpose
