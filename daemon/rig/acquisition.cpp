@@ -17,6 +17,14 @@ namespace {
 /// Positions that differ by less are the same pose: far below the resolution of any axis, far above rounding.
 constexpr double same_position = 1e-6;
 
+/// Why a picture may not show what it should.
+struct Disturbance {
+  std::string device;
+  std::string operation;  ///< what the device did not do
+  std::string cause;
+  std::string advice;
+};
+
 /// The positions of one axis of a plan, by value.
 class PositionIndex {
  public:
@@ -60,25 +68,20 @@ class Run {
       : request_(request), devices_(devices), axes_(axes), report_(report), stop_(stop) {}
 
   /// Moves the axes whose position changes, waits until all have come to rest, and takes the picture; again
-  /// when an axis has moved meanwhile.
+  /// when an axis has moved or a lamp was interrupted meanwhile.
   Frame take(const std::vector<double>& q) {
     for (int retakes = 0;; ++retakes) {
       move_to(q);
       const TimePoint rest = devices_.clock.now();
       axes_.allow(request_.frame_timeout);
       Frame frame = devices_.camera.exposed_after(rest, rest + request_.frame_timeout, stop_);
-      axes_.light_lamps();  // a view that may have been taken in the dark is not stored
-      const std::optional<std::size_t> strayed = find_strayed(q);
-      if (!strayed) return frame;
-      const std::string& axis = request_.plan.axes[*strayed].axis;
-      const std::string cause =
-          fmt::format("stood at {} after the picture, not at {}", measured_[*strayed], q[*strayed]);
+      const std::optional<Disturbance> disturbance = find_disturbance(q);
+      if (!disturbance) return frame;
+      const auto& [device, operation, cause, advice] = *disturbance;
       if (retakes == request_.most_retakes)
-        throw DeviceError(axis, "hold its position",
-                          fmt::format("{}, {} times: check its brake and load", cause, retakes + 1));
-      spdlog::warn("event=view_retaken axis={} cause=\"{}\"", axis, cause);
+        throw DeviceError(device, operation, fmt::format("{}, {} times: {}", cause, retakes + 1, advice));
+      spdlog::warn("event=view_retaken device={} cause=\"{}\"", device, cause);
       ++report_.retaken;
-      now_.clear();  // where the axes stand is not known: all are moved again
     }
   }
   /// The pose read back after the last picture.
@@ -109,6 +112,22 @@ class Run {
     now_ = q;
     axes_.allow(settle);
     if (!devices_.clock.sleep_for(settle, stop_)) throw Interrupted();
+  }
+
+  /// Looks after a picture at `q` whether it may be kept.
+  std::optional<Disturbance> find_disturbance(const std::vector<double>& q) {
+    const std::vector<std::string> interrupted = axes_.light_lamps();
+    const std::optional<std::size_t> strayed = find_strayed(q);
+    if (strayed) now_.clear();  // where the axes stand is not known: all are moved again
+    if (!interrupted.empty())
+      return Disturbance{interrupted.front(), "hold its level",
+                         "may have been dark during the picture: it had lost its level or its connection",
+                         "check its power and cable"};
+    if (!strayed) return std::nullopt;
+    return Disturbance{
+        request_.plan.axes[*strayed].axis, "hold its position",
+        fmt::format("stood at {} after the picture, not at {}", measured_[*strayed], q[*strayed]),
+        "check its brake and load"};
   }
 
   /// Reads every axis of the plan again. @return the first one that does not stand at `q`.

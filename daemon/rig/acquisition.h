@@ -26,7 +26,8 @@ struct AcquisitionRequest {
   Workspace workspace;                                ///< of the plan
   std::filesystem::path image_sets;                   ///< the new set is a folder in here
   Duration frame_timeout = std::chrono::seconds(10);  ///< to wait for a frame exposed after arrival
-  /// How often one view is taken again because an axis did not stay where it was put. Then the run fails.
+  /// How often one view is taken again because an axis did not stay where it was put or a lamp may have been
+  /// without its level. Then the run fails.
   int most_retakes = 3;
 };
 
@@ -35,9 +36,9 @@ struct AcquisitionReport {
   std::filesystem::path folder;
   std::size_t kept = 0;     ///< views that stood there from an earlier, interrupted run
   std::size_t taken = 0;    ///< views taken now
-  std::size_t retaken = 0;  ///< pictures thrown away because an axis moved meanwhile
+  std::size_t retaken = 0;  ///< pictures thrown away because an axis moved or a lamp was interrupted
   std::size_t total = 0;    ///< views of the plan
-  /// Why an axis does not stand where it stood before the run. The set is complete all the same.
+  /// Why axes do not stand where they stood before the run. The set is complete all the same.
   std::optional<std::string> not_returned;
 };
 

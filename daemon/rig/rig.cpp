@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 
@@ -159,13 +161,19 @@ void Rig::refresh(AxisSlot& slot) {
   }
 }
 
-void Rig::light(LampSlot& slot) {
+bool Rig::light(LampSlot& slot) {
   pulse_.beat(answer_timeout);
   slot.next_try = clock_.now() + reopen_pause;
   try {
     if (!slot.lamp) slot.lamp = slot.setup.open();
     slot.lamp->set_level(slot.setup.options.level, clock_.now() + answer_timeout);
+    const std::uint64_t interruptions = slot.lamp->interruptions();
+    const bool was_lit = slot.status.level.has_value();
+    const bool kept = was_lit && interruptions == std::exchange(slot.interruptions, interruptions);
+    if (was_lit && !kept)
+      spdlog::warn("event=lamp_interrupted lamp={} interruptions={}", slot.status.name, interruptions);
     note(slot, slot.lamp->level(), std::nullopt);
+    return kept;
   } catch (const std::exception& error) {
     note(slot, std::nullopt, error.what());
     slot.next_try = clock_.now() + reopen_pause;
@@ -175,7 +183,7 @@ void Rig::light(LampSlot& slot) {
 
 void Rig::try_to_light(LampSlot& slot) {
   try {
-    light(slot);
+    (void)light(slot);
   } catch (const std::exception&) {
     // It stands in the status, and is tried again later.
   }
@@ -261,8 +269,11 @@ Duration Rig::Control::settle_time(const std::string& axis) const {
   return rig_.slot(axis).setup.options.settle;
 }
 
-void Rig::Control::light_lamps() {
-  for (LampSlot& slot : rig_.lamps_) rig_.light(slot);
+std::vector<std::string> Rig::Control::light_lamps() {
+  std::vector<std::string> interrupted;
+  for (LampSlot& slot : rig_.lamps_)
+    if (!rig_.light(slot)) interrupted.push_back(slot.status.name);
+  return interrupted;
 }
 
 std::vector<ActuatorPosition> Rig::Control::actuators() {

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <future>
@@ -75,11 +76,17 @@ struct ActuatorPosition {
   std::string name;
   std::string unit;                ///< "deg", "mm"; "level" of a lamp, 0…1
   std::optional<double> position;  ///< none when it cannot be read or is not homed
+  double period = 0.0;             ///< of an axis that closes on itself; 0: it does not
+  double tolerance = 0.0;          ///< how far it may stand from where it was put; 0 of a lamp
+
+  /// The way from `other` to `position`, without sign, the short way round. @pre position has a value.
+  [[nodiscard]] double distance_from(double other) const;
 };
 
 /// Opens the devices, keeps them open, and runs work on them. A device that cannot be opened or is lost is
-/// tried again every few seconds; a lamp is told its level again as often, so that one that went out is
-/// noticed. Work that needs a device which fails ends with the device's own error. Thread-safe.
+/// tried again every few seconds; a lamp is told its level again as often, so that one that went out is lit
+/// again, and that it was out is logged. Work that needs a device which fails ends with the device's own
+/// error. Thread-safe.
 class Rig {
  public:
   /// Clock and heartbeat outlive the rig. The thread starts at once and opens what it can.
@@ -101,9 +108,10 @@ class Rig {
     double arrival_tolerance(const std::string& axis);
     /// How long the named axis takes to come to rest after arrival.
     [[nodiscard]] Duration settle_time(const std::string& axis) const;
-    /// Tells every lamp its level again, opening it first if needed. @throws the error of the first lamp that
-    /// cannot be lit.
-    void light_lamps();
+    /// Tells every lamp its level again, opening it first if needed. @return the names of those that may have
+    /// been without their level since they were last told, `Lamp::interruptions`; also of one that is lit for
+    /// the first time. @throws the error of the first lamp that cannot be lit.
+    std::vector<std::string> light_lamps();
     /// Where every axis and lamp of the rig stands. One that cannot be read has no position.
     std::vector<ActuatorPosition> actuators();
     /// The step that follows does not ask the rig for anything for as long as this: it is no sign of a hang.
@@ -136,8 +144,9 @@ class Rig {
   };
   struct LampSlot {
     RigLamp setup;
-    std::unique_ptr<Lamp> lamp;  ///< touched on the rig's thread only
-    LampStatus status;           ///< guarded by mutex_
+    std::unique_ptr<Lamp> lamp;       ///< touched on the rig's thread only
+    LampStatus status;                ///< guarded by mutex_
+    std::uint64_t interruptions = 0;  ///< of `lamp`, when it was last told its level
     TimePoint next_try{};
   };
 
@@ -146,7 +155,8 @@ class Rig {
   Axis& open(AxisSlot& slot);
   void refresh_all();
   void refresh(AxisSlot& slot);
-  void light(LampSlot& slot);
+  /// @return whether the lamp has kept its level since it was last told it.
+  bool light(LampSlot& slot);
   void try_to_light(LampSlot& slot);
   void note(AxisSlot& slot, std::optional<AxisState> state, std::optional<std::string> error);
   void note(LampSlot& slot, std::optional<double> level, std::optional<std::string> error);

@@ -28,7 +28,7 @@ struct AcquisitionResult {
   std::filesystem::path folder;  ///< of the image set
   std::size_t views = 0;         ///< of the plan
   std::size_t kept = 0;          ///< of these, taken by an earlier, interrupted run
-  std::size_t retaken = 0;       ///< pictures thrown away because an axis moved meanwhile
+  std::size_t retaken = 0;       ///< pictures thrown away because an axis moved or a lamp was interrupted
   /// Why an axis does not stand where it stood before; the set is complete all the same.
   std::optional<std::string> not_returned;
 };

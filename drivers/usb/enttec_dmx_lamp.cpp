@@ -73,7 +73,10 @@ EnttecDmxWidget::~EnttecDmxWidget() = default;
 
 void EnttecDmxWidget::exchange(const std::string& lamp, const std::vector<std::uint8_t>& frame,
                                TimePoint deadline) {
-  if (link_suspect_) link_->reopen(std::min(deadline, clock_.now() + options_.response_timeout));
+  if (link_suspect_) {
+    link_->reopen(std::min(deadline, clock_.now() + options_.response_timeout));
+    ++interruptions_;
+  }
   link_->discard_input();
   const TimePoint patience = std::min(deadline, clock_.now() + options_.response_timeout);
   link_->write(frame, patience);
@@ -118,6 +121,11 @@ void EnttecDmxWidget::show(const std::string& lamp, const Values& values, TimePo
       throw DeviceError(lamp, operation, fmt::format("{}: {}", where, failure.what()));
     }
   }
+}
+
+std::uint64_t EnttecDmxWidget::interruptions() const {
+  const std::lock_guard lock(mutex_);
+  return interruptions_;
 }
 
 EnttecDmxLamp::EnttecDmxLamp(EnttecDmxLampOptions options, std::shared_ptr<EnttecDmxWidget> widget,

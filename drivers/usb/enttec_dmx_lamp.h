@@ -32,7 +32,7 @@ struct EnttecDmxWidgetOptions {
 ///
 /// It repeats the last frame to the lamps by itself, so a level stays until it is changed. It does not
 /// acknowledge frames; after each one it is asked for its parameters, and the answer shows that it still
-/// listens.
+/// listens. DMX goes one way only: what a lamp behind it shows cannot be asked.
 class EnttecDmxWidget {
  public:
   /// Does not touch the device. @param clock must outlive the widget. @throws std::invalid_argument.
@@ -47,16 +47,19 @@ class EnttecDmxWidget {
   /// Shows `values` and leaves all other channels as they are. @param lamp opens the text of every error.
   /// @throws DeviceError and its kinds; then other lamps' frames go on without these values.
   void show(const std::string& lamp, const Values& values, TimePoint deadline);
+  /// How often its link had to be opened anew. It may have been without power each time.
+  [[nodiscard]] std::uint64_t interruptions() const;
 
  private:
   void exchange(const std::string& lamp, const std::vector<std::uint8_t>& frame, TimePoint deadline);
 
   EnttecDmxWidgetOptions options_;
   const Clock& clock_;
-  std::mutex mutex_;
-  std::unique_ptr<ByteLink> link_;  ///< guarded by mutex_
-  Values shown_;                    ///< guarded by mutex_: dark where there is none
-  bool link_suspect_ = false;       ///< guarded by mutex_: opened anew before the next use
+  mutable std::mutex mutex_;
+  std::unique_ptr<ByteLink> link_;   ///< guarded by mutex_
+  Values shown_;                     ///< guarded by mutex_: dark where there is none
+  bool link_suspect_ = false;        ///< guarded by mutex_: opened anew before the next use
+  std::uint64_t interruptions_ = 0;  ///< guarded by mutex_
 };
 
 struct EnttecDmxLampOptions {
@@ -74,6 +77,8 @@ class EnttecDmxLamp final : public Lamp {
   [[nodiscard]] const LampInfo& info() const override { return info_; }
   void set_level(double level, TimePoint deadline) override;
   [[nodiscard]] double level() const override { return level_; }
+  /// Of its widget: all lamps on it are lit anew with any of them.
+  [[nodiscard]] std::uint64_t interruptions() const override { return widget_->interruptions(); }
 
  private:
   void show(double level, TimePoint deadline);

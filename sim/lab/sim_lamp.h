@@ -2,6 +2,7 @@
 
 /// The lamp of the simulated lab.
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -25,6 +26,7 @@ class SimLamp final : public Lamp {
     level_ = level;
   }
   [[nodiscard]] double level() const override { return level_; }
+  [[nodiscard]] std::uint64_t interruptions() const override { return 0; }
 
  private:
   SimLab& lab_;

@@ -148,6 +148,7 @@ struct FakeLampRecord {
   std::atomic<bool> answers{true};  ///< it takes levels
   std::atomic<int> levels_set{0};
   std::atomic<double> level{0.0};
+  std::atomic<std::uint64_t> interruptions{0};
 };
 
 class FakeLamp final : public Lamp {
@@ -162,6 +163,7 @@ class FakeLamp final : public Lamp {
     ++record_.levels_set;
   }
   [[nodiscard]] double level() const override { return record_.level; }
+  [[nodiscard]] std::uint64_t interruptions() const override { return record_.interruptions; }
 
  private:
   FakeLampRecord& record_;

@@ -54,6 +54,7 @@ class ObedientLamp final : public Lamp {
   const LampInfo& info() const override { return info_; }
   void set_level(double level, TimePoint) override { level_ = level; }
   double level() const override { return level_; }
+  std::uint64_t interruptions() const override { return 0; }
 
  private:
   LampInfo info_{"key", "test lamp"};

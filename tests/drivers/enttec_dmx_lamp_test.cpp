@@ -90,6 +90,20 @@ TEST(EnttecDmxLamp, LampsOnOneWidgetLeaveEachOtherAsTheyAre) {
   EXPECT_EQ(rig.widget().channel(1), 102) << "the other one still shines";
 }
 
+TEST(EnttecDmxLamp, EveryLampOfAWidgetThatWasAwayCountsIt) {
+  DmxRig rig({}, {{1, 1.0}});
+  auto fill = rig.another_lamp("fill", {{2, 1.0}});
+  for (int i = 0; i < 3; ++i) rig.lamp().set_level(1.0, soon());
+  fill->set_level(1.0, soon());
+  EXPECT_EQ(rig.lamp().interruptions(), 0U);
+  EXPECT_EQ(fill->interruptions(), 0U);
+  rig.unplug();
+  rig.plug_in();
+  rig.lamp().set_level(1.0, soon());
+  EXPECT_EQ(rig.lamp().interruptions(), 1U);
+  EXPECT_EQ(fill->interruptions(), 1U) << "it was without power too, though the first has lit it again";
+}
+
 TEST(EnttecDmxLamp, ALevelThatFailedIsNotShownByAnotherLampsFrame) {
   DmxRig rig({}, {{1, 1.0}});
   auto fill = rig.another_lamp("fill", {{2, 1.0}});

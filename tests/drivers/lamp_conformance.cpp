@@ -70,6 +70,16 @@ TEST_P(LampConformance, FindsALampAgainThatWasAway) {
   EXPECT_NEAR(rig().truth(), 0.7, one_step);
 }
 
+TEST_P(LampConformance, CountsThatItsDeviceWasAwaySinceItWasLit) {
+  lamp().set_level(0.5, soon());
+  const std::uint64_t before = lamp().interruptions();
+  rig().unplug();
+  rig().plug_in();
+  lamp().set_level(0.5, soon());
+  EXPECT_GT(lamp().interruptions(), before) << "back within the retries of one call";
+  EXPECT_NEAR(rig().truth(), 0.5, one_step);
+}
+
 TEST_P(LampConformance, CanBeDestroyedWhileTheLampIsAwayAndLeavesItAsItWas) {
   lamp().set_level(0.5, soon());
   rig().unplug();

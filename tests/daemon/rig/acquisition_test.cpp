@@ -163,6 +163,47 @@ TEST_F(AcquisitionTest, AViewWhoseAxisLostItsHomeOrStillMovedIsTakenAgain) {
   EXPECT_EQ(table_record_.homings, 1);
 }
 
+TEST_F(AcquisitionTest, AViewDuringWhichALampWasInterruptedIsTakenAgain) {
+  int frames = 0;  // counted with the axis's lock held, at the third pose
+  set(table_record_, &FakeAxisRecord::on_frame, [&](FakeAxisRecord& axis) {
+    if (axis.moves.size() == 3 && ++frames == 1) ++lamp_record_.interruptions;
+  });
+  const AcquisitionReport report = run(turn("mug"));
+  EXPECT_EQ(report.retaken, 1U);
+  EXPECT_EQ(report.taken, 6U);
+  EXPECT_EQ(frames, 2);
+  EXPECT_THAT(table_record_.moves, ElementsAre(0, 60, 120, 180, 240, 300, 0)) << "no axis has moved";
+}
+
+TEST_F(AcquisitionTest, ALampInterruptedWhileAnAxisWasPushedDoesNotHideIt) {
+  set(table_record_, &FakeAxisRecord::on_frame, [this, done = false](FakeAxisRecord& axis) mutable {
+    if (axis.moves.size() != 3 || done) return;
+    ++lamp_record_.interruptions;
+    axis.position += 30.0;
+    done = true;
+  });
+  EXPECT_EQ(run(turn("mug")).retaken, 1U);
+  const ImageSet views = ImageSet::open(folder_.path() / "mug");
+  ASSERT_EQ(views.views().size(), 6U);
+  for (std::size_t i = 0; i < views.views().size(); ++i)
+    EXPECT_EQ(views.load(i).at<unsigned char>(0, 0), 6 * i) << "view " << i;
+}
+
+TEST_F(AcquisitionTest, ALampThatIsInterruptedAgainAndAgainEndsTheRun) {
+  set(table_record_, &FakeAxisRecord::on_frame, [this](FakeAxisRecord&) { ++lamp_record_.interruptions; });
+  AcquisitionRequest request = turn("mug");
+  request.most_retakes = 2;
+  try {
+    run(request);
+    FAIL() << "succeeded";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("key: hold its level: may have been dark during the picture"));
+    EXPECT_THAT(error.what(), HasSubstr("3 times: check its power and cable"));
+  }
+  EXPECT_EQ(report_.retaken, 2U);
+  EXPECT_EQ(report_.taken, 0U) << "no picture that may be dark is kept";
+}
+
 TEST_F(AcquisitionTest, AnAxisThatNeverStaysEndsTheRunAfterAFewTries) {
   set(table_record_, &FakeAxisRecord::on_frame, [](FakeAxisRecord& axis) { axis.position += 30.0; });
   AcquisitionRequest request = turn("mug");
