@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
@@ -91,13 +92,25 @@ class Run {
   void note_start(const std::vector<ActuatorPosition>& actuators) {
     for (const ActuatorPosition& actuator : actuators) start_[actuator.name] = actuator.position;
   }
-  /// Moves each axis of the plan back.
-  void return_axes() {
+  /// Moves each axis of the plan back, whatever becomes of the others, until a stop is requested.
+  /// @return why some do not stand there; nothing when all do.
+  std::optional<std::string> return_axes() {
     const std::vector<double> first = request_.workspace.canonical(request_.plan.at(0));
-    for (std::size_t i = 0; i < first.size(); ++i) {
+    std::vector<std::string> failures;
+    for (std::size_t i = 0; i < first.size() && (failures.empty() || !stop_.stop_requested()); ++i) {
       const std::string& axis = request_.plan.axes[i].axis;
-      axes_.move_to(axis, start_[axis].value_or(first[i]), stop_);
+      const Dof& dof = request_.workspace[i];
+      double target = start_[axis].value_or(first[i]);
+      // An axis at its end may be read back a little beyond it.
+      if (!dof.periodic) target = std::clamp(target, dof.lower, dof.upper);
+      try {
+        axes_.move_to(axis, target, stop_);
+      } catch (const std::exception& error) {
+        failures.emplace_back(error.what());
+      }
     }
+    if (failures.empty()) return std::nullopt;
+    return fmt::format("{}", fmt::join(failures, "; "));
   }
 
  private:
@@ -208,13 +221,9 @@ void acquire(const AcquisitionRequest& request, const AcquisitionDevices& device
     set.finish();
     if (progress) progress({"acquiring", report.total, report.total});
     if (poses.empty()) return;
-    try {
-      run.return_axes();
-    } catch (const Error& error) {
-      // The set is complete and stays so.
-      report.not_returned = error.what();
-      spdlog::warn("event=axes_not_returned object={} error=\"{}\"", request.object, error.what());
-    }
+    report.not_returned = run.return_axes();
+    if (report.not_returned)
+      spdlog::warn("event=axes_not_returned object={} error=\"{}\"", request.object, *report.not_returned);
   });
   spdlog::info("event=acquisition_done object={} views={} retaken={}", request.object, report.total,
                report.retaken);

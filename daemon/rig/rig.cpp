@@ -217,8 +217,15 @@ void Rig::drop(AxisSlot& slot) {
   dropped.swap(slot.axis);
 }
 
+double ActuatorPosition::distance_from(double other) const {
+  const double difference = *position - other;
+  return std::abs(period > 0.0 ? std::remainder(difference, period) : difference);
+}
+
 double Rig::Control::move_to(const std::string& name, double position, const std::stop_token& stop) {
   AxisSlot& slot = rig_.slot(name);
+  // A request that no axis could obey is no failure of this one: nothing is opened, homed or noted.
+  check_target(name, slot.setup.options.dof, position);
   const RigAxisOptions& options = slot.setup.options;
   try {
     rig_.pulse_.beat(answer_timeout);

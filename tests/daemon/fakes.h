@@ -45,6 +45,8 @@ struct FakeAxisRecord {
   double tolerance = 0.5;            ///< of arrival, read when the axis is opened
   std::optional<std::string> alarm;  ///< from now on
   int fails_from_stop = -1;          ///< from this stop on the axis cannot be told to stop
+  /// Called with the lock held and the target before a move; what it throws the move throws.
+  std::function<void(double)> before_move;
   /// Called with the lock held when a frame's exposure is over.
   std::function<void(FakeAxisRecord&)> on_frame;
 };
@@ -74,7 +76,9 @@ class FakeAxis final : public Axis {
     record_.homed = true;
   }
   double move_to(double position, TimePoint, std::stop_token stop) override {
+    check_target(info_.dof.name, info_.dof, position);
     std::unique_lock lock(record_.mutex);
+    if (record_.before_move) record_.before_move(position);
     record_.moves.push_back(position);
     if (record_.lost_from_move >= 0 && static_cast<int>(record_.moves.size()) > record_.lost_from_move)
       throw DeviceLost(info_.dof.name, "move", "connection closed");

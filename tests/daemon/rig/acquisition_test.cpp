@@ -1,7 +1,9 @@
 #include "daemon/rig/acquisition.h"
 
+#include <cmath>
 #include <fstream>
 #include <future>
+#include <stdexcept>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -102,6 +104,44 @@ TEST_F(AcquisitionTest, AFailedReturnMoveLeavesTheSetCompleteAndIsReported) {
   EXPECT_EQ(report.taken, 6U);
   EXPECT_THAT(report.not_returned.value_or(""), HasSubstr("table: move: connection closed"));
   EXPECT_TRUE(ImageSet::open(folder_.path() / "mug").complete());
+}
+
+TEST_F(AcquisitionTest, AnAxisReadBackALittleBeyondItsEndReturnsToItsEnd) {
+  for (const double beyond : {-90.005, 90.005}) {
+    const double end = std::round(beyond);
+    set(arm_record_, &FakeAxisRecord::position, beyond);
+    set(arm_record_, &FakeAxisRecord::moves, std::vector<double>());
+    const std::string object = "mug" + std::to_string(static_cast<int>(end));
+    const AcquisitionReport report = run(request(object, {{"arm", {-30, 30}, {}}}));
+    EXPECT_FALSE(report.not_returned) << *report.not_returned;
+    EXPECT_THAT(arm_record_.moves, ElementsAre(-30, 30, end));
+    EXPECT_TRUE(ImageSet::open(folder_.path() / object).complete());
+    EXPECT_FALSE(rig_.status().axes[1].error);
+  }
+}
+
+TEST_F(AcquisitionTest, AReturnThatFailsInAnyWayLeavesTheSetComplete) {
+  set(arm_record_, &FakeAxisRecord::position, 10.0);
+  set(arm_record_, &FakeAxisRecord::before_move, [](double target) {
+    if (target == 10.0) throw std::length_error("no device's own words");
+  });
+  const AcquisitionReport report = run(request("mug", {{"arm", {-30, 30}, {}}}));
+  EXPECT_EQ(report.not_returned, "no device's own words");
+  EXPECT_TRUE(ImageSet::open(folder_.path() / "mug").complete());
+}
+
+TEST_F(AcquisitionTest, AnAxisThatDoesNotReturnKeepsNoOtherFromReturning) {
+  set(arm_record_, &FakeAxisRecord::position, 10.0);
+  set(table_record_, &FakeAxisRecord::position, 45.0);
+  set(arm_record_, &FakeAxisRecord::lost_from_move, 1);
+  AcquisitionReport report = run(request("mug", {{"arm", {-30}, {}}, {"table", {0, 120}, {}}}));
+  EXPECT_EQ(report.not_returned, "arm: move: connection closed");
+  EXPECT_THAT(table_record_.moves, ElementsAre(0, 120, 45));
+
+  set(arm_record_, &FakeAxisRecord::lost_from_move, 3);
+  set(table_record_, &FakeAxisRecord::lost_from_move, 5);
+  report = run(request("duck", {{"arm", {-30}, {}}, {"table", {0, 120}, {}}}));
+  EXPECT_EQ(report.not_returned, "arm: move: connection closed; table: move: connection closed");
 }
 
 TEST_F(AcquisitionTest, RecordsWhereEveryActuatorStoodAndThePoseReadBackOfEachView) {

@@ -134,6 +134,35 @@ TEST_F(RigTest, WorkCanAskForLightAndGetsTheLampsErrorIfThereIsNone) {
   EXPECT_EQ(key_record_.level, 0.8);
 }
 
+TEST_F(RigTest, WorkLearnsWhichLampsMayHaveBeenDarkSinceTheyWereLit) {
+  const auto rig = this->rig({}, {fake_lamp("fill", 0.3, fill_record_), fake_lamp("key", 0.8, key_record_)});
+  eventually([&] { return rig->status().lamps[1].level.has_value(); });
+  const auto light = [&] {
+    std::vector<std::string> interrupted;
+    rig->run([&](Rig::Control& axes) { interrupted = axes.light_lamps(); });
+    return interrupted;
+  };
+  EXPECT_THAT(light(), ElementsAre());
+  ++key_record_.interruptions;
+  EXPECT_THAT(light(), ElementsAre("key"));
+  EXPECT_THAT(light(), ElementsAre()) << "said once";
+  fill_record_.answers = false;
+  EXPECT_THROW(light(), DeviceTimeout);
+  fill_record_.answers = true;
+  EXPECT_THAT(light(), ElementsAre("fill")) << "it was not known to be lit";
+}
+
+TEST_F(RigTest, ATargetOutsideItsRangeIsNoFailureOfTheAxis) {
+  arm_record_.homed = false;
+  const auto rig = this->rig({fake(arm, arm_record_)});
+  rig->run([](Rig::Control& axes) { axes.state("arm"); });
+  EXPECT_THROW(rig->run([](Rig::Control& axes) { axes.move_to("arm", 90.001, {}); }), std::out_of_range);
+  EXPECT_EQ(arm_record_.homings, 0) << "nothing moves for a target that is refused";
+  const AxisStatus status = rig->status().axes[0];
+  EXPECT_FALSE(status.error);
+  EXPECT_FALSE(status.state->moving);
+}
+
 TEST_F(RigTest, SaysWhereEveryActuatorStandsAndLeavesOutWhatIsNotKnown) {
   table_record_.position = 42.0;
   arm_record_.homed = false;
