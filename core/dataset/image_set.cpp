@@ -16,7 +16,9 @@ ImageSet ImageSet::open(const std::filesystem::path& folder) {
   ImageSet set;
   set.folder_ = folder;
   set.object_ = std::move(index.object);
-  set.views_ = read_set_journal(folder, index.workspace, index.complete).views;
+  set.views_ =
+      read_set_journal(folder, index.workspace, index.complete ? SetState::complete : SetState::unfinished)
+          .views;
   set.workspace_ = std::move(index.workspace);
   set.cropped_ = index.cropped;
   set.complete_ = index.complete;

@@ -91,7 +91,8 @@ class ImageSetWriter {
  public:
   /// Makes `root/object` (and continues an incomplete set of the same object and workspace that stands
   /// there).
-  /// @param source a JSON object that says where the views come from; kept in set.json.
+  /// @param source a JSON object that says where the views come from; kept in set.json. A set that has views
+  /// already keeps the one they were taken with: whether the two go together, the caller must see.
   /// @throws FileError when a complete set stands there already, another writer has it, or the folder cannot
   /// be written; what check_object_name throws.
   ImageSetWriter(const std::filesystem::path& root, const std::string& object, Workspace workspace,
@@ -101,6 +102,8 @@ class ImageSetWriter {
   ~ImageSetWriter();
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// The source that stands in set.json.
+  [[nodiscard]] nlohmann::json source() const;
   /// Views that stood there when it was opened.
   [[nodiscard]] const std::vector<ViewRecord>& views() const { return views_; }
   /// Image to disk, then its journal line. @throws FileError (disk full, …); then the set is as it was

@@ -65,7 +65,8 @@ ViewRecord parse_view(std::string_view text, const Workspace& workspace) {
 
 }  // namespace
 
-SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, bool complete) {
+SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, SetState state) {
+  const bool complete = state == SetState::complete;
   const auto file = folder / "views.jsonl";
   SetJournal journal;
   std::error_code error;
@@ -118,6 +119,14 @@ SetIndex read_set_index(const std::filesystem::path& folder) {
                    json_flag(json_member(all, "complete"), "complete")};
     check_object_name(index.object);
     return index;
+  });
+}
+
+json read_set_source(const std::filesystem::path& folder) {
+  const auto file = folder / "set.json";
+  const auto bytes = read_file(file);
+  return in_file(file, "", [&] {
+    return json_member(parse_json({reinterpret_cast<const char*>(bytes.data()), bytes.size()}), "source");
   });
 }
 

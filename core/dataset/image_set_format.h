@@ -30,9 +30,17 @@ struct SetJournal {
 
 /// @throws FileError when set.json is missing or malformed.
 SetIndex read_set_index(const std::filesystem::path& folder);
+/// The source in set.json. @throws FileError when set.json is malformed or has none.
+nlohmann::json read_set_source(const std::filesystem::path& folder);
+
+/// What a journal is read for.
+enum class SetState {
+  unfinished,  ///< views may be missing, and the last line may be cut off
+  complete     ///< every view has its line
+};
 /// @throws FileError when views.jsonl is malformed; and for a complete set when it is missing, empty or cut
 /// off.
-SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, bool complete);
+SetJournal read_set_journal(const std::filesystem::path& folder, const Workspace& workspace, SetState state);
 /// One line of a journal (indent −1) or the text of a file. Texts that are not UTF-8, such as old file names,
 /// get the replacement character U+FFFD where they are not.
 std::string json_line(const nlohmann::json& value, int indent = -1);

@@ -63,11 +63,10 @@ ImageSetWriter::ImageSetWriter(const fs::path& root, const std::string& object, 
   remove_abandoned_parts(folder_);
   std::uint64_t good_bytes = 0;
   std::error_code error;
-  if (fs::exists(folder_ / "set.json", error) || error)
-    good_bytes = take_up();
-  else
+  if (fs::exists(folder_ / "set.json", error) || error) good_bytes = take_up();
+  if (views_.empty())
     write_file_atomically(folder_ / "set.json",
-                          set_index_text({object_, workspace_, options_.cropped, false}, source));
+                          set_index_text({object_, workspace_, options_.cropped, false}, this->source()));
   files_->journal = std::make_unique<JournalFile>(folder_ / "views.jsonl", good_bytes);
 }
 
@@ -81,10 +80,15 @@ std::uint64_t ImageSetWriter::take_up() {
     throw FileError(folder_,
                     "is an unfinished image set of another object, workspace or kind of view; remove it or "
                     "give the object another name");
-  SetJournal journal = read_set_journal(folder_, workspace_, false);
+  SetJournal journal = read_set_journal(folder_, workspace_, SetState::unfinished);
   views_ = std::move(journal.views);
+  if (!views_.empty()) source_ = json_line(read_set_source(folder_));
   for (const ViewRecord& view : views_) next_file_ = std::max(next_file_, number_after(view.file));
   return journal.good_bytes;
+}
+
+json ImageSetWriter::source() const {
+  return json::parse(source_);
 }
 
 void ImageSetWriter::add(const cv::Mat& image, std::vector<double> q) {
@@ -133,7 +137,7 @@ void ImageSetWriter::finish() {
   if (views_.empty()) throw FileError(folder_, "has no view and cannot be complete; acquire at least one");
   if (!options_.sync_every_view) flush_file_system(folder_);
   write_file_atomically(folder_ / "set.json",
-                        set_index_text({object_, workspace_, options_.cropped, true}, json::parse(source_)));
+                        set_index_text({object_, workspace_, options_.cropped, true}, source()));
 }
 
 }  // namespace eigenpose

@@ -76,17 +76,6 @@ cv::Mat load_alike(const fs::path& file, cv::Mat& first) {
   return image;
 }
 
-/// The source of an image set. @throws FileError when set.json cannot be read.
-json source_of(const fs::path& folder) {
-  const fs::path file = folder / "set.json";
-  const auto bytes = read_file(file);
-  try {
-    return json_member(parse_json({reinterpret_cast<const char*>(bytes.data()), bytes.size()}), "source");
-  } catch (const JsonError& wrong) {
-    throw FileError(file, wrong.what());
-  }
-}
-
 /// Every view of the set is one of the listed ones. Some may have been left out.
 bool made_of(const ImageSet& set, const ImportObject& object, const Workspace& workspace) {
   return set.workspace() == workspace && set.views().size() <= object.views.size() &&
@@ -163,7 +152,7 @@ bool import_finished(const ImportObject& object, const fs::path& root, const Wor
   const fs::path folder = root / object.name;
   std::error_code error;  // where it cannot be looked up, writing it says why
   if (!fs::exists(folder / "set.json", error)) return false;
-  const bool own = source_of(folder) == parse_json(json_line(source));  // as it is written
+  const bool own = read_set_source(folder) == parse_json(json_line(source));  // as it is written
   const ImageSet set = ImageSet::open(folder);
   if (set.complete()) {
     if (own && made_of(set, object, workspace)) return true;

@@ -53,12 +53,73 @@ class PositionIndex {
   std::vector<std::pair<double, std::size_t>> sorted_;  ///< canonical position, its number in the plan
 };
 
-nlohmann::json to_record(const std::vector<ActuatorPosition>& actuators) {
+std::string record_key(const ActuatorPosition& actuator) {
+  return actuator.name + "_" + actuator.unit;
+}
+
+/// Where the set comes from, as it stands in set.json.
+nlohmann::json source_of(const AcquisitionRequest& request, const std::vector<ActuatorPosition>& actuators) {
   nlohmann::json record = nlohmann::json::object();
   for (const ActuatorPosition& actuator : actuators)
-    record[actuator.name + "_" + actuator.unit] =
+    record[record_key(actuator)] =
         actuator.position ? nlohmann::json(*actuator.position) : nlohmann::json(nullptr);
-  return record;
+  return {{"acquired_by", "eigenposed"}, {"plan", request.plan.name}, {"actuators", record}};
+}
+
+/// What a set was begun with: the number under `key`, nothing when it was not known or not there.
+std::optional<double> recorded_position(const nlohmann::json& actuators, const std::string& key) {
+  const auto found = actuators.find(key);
+  if (found == actuators.end() || !found->is_number()) return std::nullopt;
+  return found->get<double>();
+}
+
+/// "stood at -30 deg and stands at 30 deg now"; nothing when `actuator` stands where it stood.
+std::optional<std::string> difference_of(const ActuatorPosition& actuator, std::optional<double> before) {
+  const std::optional<double>& now = actuator.position;
+  if (!before && !now) return std::nullopt;
+  // Once for how it stood then, once for how it was moved back.
+  if (before && now && actuator.distance_from(*before) <= std::max(2.0 * actuator.tolerance, same_position))
+    return std::nullopt;
+  const auto in_words = [&](const char* verb, const std::optional<double>& position) {
+    return position ? fmt::format("{} at {:.6g} {}", verb, *position, actuator.unit)
+                    : fmt::format("{} at a position that is not known", verb);
+  };
+  return fmt::format("{} {} and {} now", actuator.name, in_words("stood", before), in_words("stands", now));
+}
+
+/// Refuses to continue a set that was begun with another state of the rig.
+/// @throws FileError saying what differs and what to do.
+void check_alike(const ImageSetWriter& set, const Plan& plan,
+                 const std::vector<ActuatorPosition>& actuators) {
+  const nlohmann::json source = set.source();
+  if (!source.empty() &&
+      (!source.is_object() || source.value("acquired_by", nlohmann::json()) != "eigenposed"))
+    throw FileError(
+        set.folder(),
+        "is an unfinished image set that no acquisition has begun; finish or remove it, or give the "
+        "object another name");
+  if (!source.contains("actuators") || !source["actuators"].is_object()) return;  // it says nothing of them
+  const nlohmann::json& before = source["actuators"];
+  std::vector<std::string> differences;
+  nlohmann::json gone = before;
+  for (const ActuatorPosition& actuator : actuators) {
+    gone.erase(record_key(actuator));
+    const bool moved_by_plan = std::any_of(plan.axes.begin(), plan.axes.end(),
+                                           [&](const PlanAxis& axis) { return axis.axis == actuator.name; });
+    if (moved_by_plan) continue;
+    if (auto difference = difference_of(actuator, recorded_position(before, record_key(actuator))))
+      differences.push_back(std::move(*difference));
+  }
+  for (const auto& [key, position] : gone.items())
+    if (position.is_number())
+      differences.push_back(fmt::format("{} stood at {} and is not configured now", key, position.dump()));
+  if (differences.empty()) return;
+  throw FileError(
+      set.folder(),
+      fmt::format("was begun with another state of the rig, and its views would not be alike: {}; put "
+                  "back what differs ('eigenpose jog' with eigenposed stopped; a lamp's level in the "
+                  "configuration) and acquire again, or remove the set",
+                  fmt::join(differences, ", ")));
 }
 
 /// One run, on the rig's thread.
@@ -198,11 +259,10 @@ void acquire(const AcquisitionRequest& request, const AcquisitionDevices& device
   report.total = request.plan.size();
   const FrameHub::OnDemand on_demand(devices.camera);
   devices.rig.run([&](Rig::Control& axes) {
+    axes.light_lamps();
     const std::vector<ActuatorPosition> actuators = axes.actuators();
-    ImageSetWriter set(
-        request.image_sets, request.object, request.workspace,
-        nlohmann::json{
-            {"acquired_by", "eigenposed"}, {"plan", request.plan.name}, {"actuators", to_record(actuators)}});
+    ImageSetWriter set(request.image_sets, request.object, request.workspace, source_of(request, actuators));
+    check_alike(set, request.plan, actuators);
     report.folder = set.folder();
     const std::vector<std::vector<double>> poses =
         missing_poses(request.plan, request.workspace, set.views());
@@ -211,7 +271,6 @@ void acquire(const AcquisitionRequest& request, const AcquisitionDevices& device
                  request.plan.name, report.total, report.kept);
     Run run(request, devices, axes, report, stop);
     run.note_start(actuators);
-    if (!poses.empty()) axes.light_lamps();
     for (const std::vector<double>& q : poses) {
       if (progress) progress({"acquiring", report.kept + report.taken, report.total});
       const Frame frame = run.take(q);

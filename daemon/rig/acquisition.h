@@ -50,13 +50,21 @@ struct AcquisitionDevices {
 };
 
 /// Visits the grid of the plan and takes one raw picture a pose: with every lamp lit, after every moved axis
-/// has arrived and settled, from a frame exposed after that, and only if each axis still stands there
-/// afterwards. Each view is on disk before the next move, with the pose read back beside the pose of the
-/// plan; views an earlier run has taken are not taken again. The set records where every actuator of the rig
-/// stood. At the end each axis that was moved returns to where it stood before, or to the plan's first pose
-/// if that is not known; a failure to return is reported and does not fail the set.
-/// @throws FileError (a complete set of that name, a full disk) before or between moves, DeviceError and its
-/// kinds, Interrupted. Whatever ends it: no motion is left running, and what was taken is kept.
+/// has arrived and settled, from a frame exposed after that, and only if afterwards each axis still stands
+/// there and no lamp has been connected anew or lost its level. Each view is on disk before the next move,
+/// with the pose read back beside the pose of the plan. The set records where every actuator of the rig stood
+/// when it was begun.
+///
+/// A set that an earlier run has begun is continued: views it has are not taken again. It is refused if an
+/// axis or lamp that the plan does not move stands elsewhere than it stood then: its views would not be
+/// alike.
+///
+/// At the end each axis of the plan returns to where it stood before this run (the nearest end of its range,
+/// if it stood beyond), or to the plan's first pose if that is not known; a failure to return is reported and
+/// does not fail the set.
+/// @throws FileError (a complete set of that name, one begun with another state of the rig, a full disk)
+/// before or between moves, DeviceError and its kinds, Interrupted. Whatever ends it: no motion is left
+/// running, and what was taken is kept.
 void acquire(const AcquisitionRequest& request, const AcquisitionDevices& devices, AcquisitionReport& report,
              const Progress& progress, const std::stop_token& stop);
 

@@ -287,9 +287,10 @@ std::vector<ActuatorPosition> Rig::Control::actuators() {
   std::vector<ActuatorPosition> result;
   for (const AxisSlot& slot : rig_.axes_) {
     const Dof& dof = slot.setup.options.dof;
-    ActuatorPosition actuator{dof.name, dof.unit, std::nullopt};
+    ActuatorPosition actuator{dof.name, dof.unit, std::nullopt, dof.periodic ? dof.period() : 0.0};
     try {
       if (const AxisState now = state(dof.name); now.homed) actuator.position = now.position;
+      actuator.tolerance = arrival_tolerance(dof.name);
     } catch (const std::exception&) {
       // It has no position; whoever needs this axis learns why when it is moved.
     }

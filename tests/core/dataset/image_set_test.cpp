@@ -78,6 +78,23 @@ TEST_F(ImageSetFiles, ContinuesWhatWasBrokenOff) {
   EXPECT_EQ(set.load(3).at<unsigned char>(0, 0), 99);
 }
 
+TEST_F(ImageSetFiles, AContinuedSetKeepsTheSourceOfTheViewsItHas) {
+  const auto source_in_file = [&] {
+    return nlohmann::json::parse(read(root() / "mug" / "set.json")).at("source");
+  };
+  const nlohmann::json another = {{"from", "another test"}};
+  make("mug", 0, false);
+  EXPECT_EQ(ImageSetWriter(root(), "mug", turntable_workspace(), another).source(), another);
+  EXPECT_EQ(source_in_file(), another) << "it had no view: its source is that of the views to come";
+  std::filesystem::remove_all(root() / "mug");
+
+  make("mug", 2, false);
+  ImageSetWriter writer(root(), "mug", turntable_workspace(), another);
+  EXPECT_EQ(writer.source(), nlohmann::json({{"from", "a test"}}));
+  writer.finish();
+  EXPECT_EQ(source_in_file(), nlohmann::json({{"from", "a test"}}));
+}
+
 TEST_F(ImageSetFiles, NeverWritesOverACompleteSet) {
   make("mug", 3);
   EXPECT_THAT([&] { make("mug", 3); }, ThrowsMessage<FileError>(HasSubstr("complete image set already")));

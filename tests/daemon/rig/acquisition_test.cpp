@@ -155,7 +155,7 @@ TEST_F(AcquisitionTest, RecordsWhereEveryActuatorStoodAndThePoseReadBackOfEachVi
   const nlohmann::json& actuators = set.at("source").at("actuators");
   EXPECT_EQ(actuators.at("table_deg"), 45.0);
   EXPECT_EQ(actuators.at("arm_deg"), 0.0);
-  EXPECT_TRUE(actuators.contains("key_level"));
+  EXPECT_EQ(actuators.at("key_level"), 0.8) << "it is lit before the record is made";
   std::ifstream journal(folder_.path() / "mug" / "views.jsonl");
   std::string line;
   std::getline(journal, line);
@@ -370,6 +370,103 @@ TEST_F(AcquisitionTest, ContinuesWhereItWasBrokenOff) {
   EXPECT_EQ(report.taken, 3U);
   EXPECT_THAT(table_record_.moves, ElementsAre(180, 240, 300, 120)) << "it stood at 120 when the run began";
   EXPECT_EQ(ImageSet::open(folder_.path() / "mug").views().size(), 6U);
+}
+
+/// A set that was broken off after three views, with the arm at −30.
+class BrokenOff : public AcquisitionTest {
+ protected:
+  void SetUp() override {
+    set(arm_record_, &FakeAxisRecord::position, -30.0);
+    set(table_record_, &FakeAxisRecord::lost_from_move, 3);
+    EXPECT_THROW(run(turn("mug")), DeviceLost);
+    set(table_record_, &FakeAxisRecord::lost_from_move, -1);
+    set(table_record_, &FakeAxisRecord::moves, std::vector<double>());
+  }
+  /// Why the set is not continued on `rig`; empty when it was.
+  std::string refusal(Rig& rig) {
+    AcquisitionReport report;
+    try {
+      acquire(turn("mug"), {rig, camera_, clock_}, report, {}, {});
+    } catch (const FileError& error) {
+      EXPECT_TRUE(table_record_.moves.empty()) << "nothing moves before it is refused";
+      EXPECT_EQ(ImageSet::open(folder_.path() / "mug").views().size(), 3U);
+      return error.what();
+    }
+    return "";
+  }
+  nlohmann::json recorded() const {
+    std::ifstream index(folder_.path() / "mug" / "set.json");
+    return nlohmann::json::parse(index).at("source").at("actuators");
+  }
+};
+
+TEST_F(BrokenOff, IsNotContinuedWhereAnAxisOutsideThePlanStandsElsewhere) {
+  set(arm_record_, &FakeAxisRecord::position, 30.0);
+  const std::string text = refusal(rig_);
+  EXPECT_THAT(text, HasSubstr("arm stood at -30 deg and stands at 30 deg now"));
+  EXPECT_THAT(text, HasSubstr("'eigenpose jog'"));
+  EXPECT_THAT(text, HasSubstr("or remove the set"));
+  set(arm_record_, &FakeAxisRecord::position, -31.01);
+  EXPECT_NE(refusal(rig_), "") << "beyond twice the tolerance of 0.5";
+  set(arm_record_, &FakeAxisRecord::position, -30.99);
+  EXPECT_EQ(refusal(rig_), "");
+  EXPECT_EQ(recorded().at("arm_deg"), -30.0) << "the record is of the first run";
+  EXPECT_EQ(recorded().at("table_deg"), 0.0);
+}
+
+TEST_F(BrokenOff, IsNotContinuedWhereAnAxisOutsideThePlanHasLostItsPosition) {
+  set(arm_record_, &FakeAxisRecord::homed, false);
+  EXPECT_THAT(refusal(rig_),
+              HasSubstr("arm stood at -30 deg and stands at a position that is not known now"));
+  set(arm_record_, &FakeAxisRecord::homed, true);
+  EXPECT_EQ(refusal(rig_), "");
+}
+
+TEST_F(BrokenOff, IsNotContinuedInAnotherLight) {
+  Rig dimmer({fake(table, table_record_, clock_), fake(arm, arm_record_, clock_)},
+             {fake_lamp("key", 0.5, lamp_record_)}, clock_, heartbeat_);
+  EXPECT_THAT(refusal(dimmer), HasSubstr("key stood at 0.8 level and stands at 0.5 level now"));
+  Rig unlit({fake(table, table_record_, clock_), fake(arm, arm_record_, clock_)}, {}, clock_, heartbeat_);
+  EXPECT_THAT(refusal(unlit), HasSubstr("key_level stood at 0.8 and is not configured now"));
+  FakeLampRecord fill;
+  Rig brighter({fake(table, table_record_, clock_), fake(arm, arm_record_, clock_)},
+               {fake_lamp("key", 0.8, lamp_record_), fake_lamp("fill", 0.3, fill)}, clock_, heartbeat_);
+  EXPECT_THAT(refusal(brighter), HasSubstr("fill stood at a position that is not known and stands at 0.3"));
+}
+
+TEST_F(AcquisitionTest, AnAxisThatWasNotHomedAtTheBeginningMustNotBeAtTheContinuation) {
+  set(arm_record_, &FakeAxisRecord::homed, false);
+  for (const int lost_from : {3, 5}) {
+    set(table_record_, &FakeAxisRecord::lost_from_move, lost_from);
+    EXPECT_THROW(run(turn("mug")), DeviceLost) << "where it stands is as unknown as before";
+  }
+  set(arm_record_, &FakeAxisRecord::homed, true);
+  EXPECT_THROW(run(turn("mug")), FileError) << "it was moved to be homed";
+}
+
+TEST_F(AcquisitionTest, ASetBegunWithoutAViewIsBegunAnewWhereverTheRigStands) {
+  set(table_record_, &FakeAxisRecord::lost_from_move, 0);
+  EXPECT_THROW(run(turn("mug")), DeviceLost);
+  set(table_record_, &FakeAxisRecord::lost_from_move, -1);
+  set(arm_record_, &FakeAxisRecord::position, 30.0);
+  EXPECT_EQ(run(turn("mug")).taken, 6U);
+  std::ifstream index(folder_.path() / "mug" / "set.json");
+  EXPECT_EQ(nlohmann::json::parse(index).at("source").at("actuators").at("arm_deg"), 30.0);
+}
+
+TEST_F(AcquisitionTest, AnUnfinishedSetThatNoAcquisitionHasBegunIsNotContinued) {
+  const AcquisitionRequest request = turn("mug");
+  ImageSetWriter(request.image_sets, "mug", request.workspace, {{"imported_from", "photographs"}})
+      .add(cv::Mat(8, 8, CV_8UC1, cv::Scalar(9)), {0.0});
+  EXPECT_THROW(run(request), FileError);
+  EXPECT_TRUE(table_record_.moves.empty());
+}
+
+TEST_F(AcquisitionTest, AnUnfinishedSetThatSaysNothingOfTheRigIsContinued) {
+  const AcquisitionRequest request = turn("mug");
+  ImageSetWriter(request.image_sets, "mug", request.workspace, nlohmann::json::object())
+      .add(cv::Mat(48, 64, CV_8UC1, cv::Scalar(0)), {0.0});
+  EXPECT_EQ(run(request).kept, 1U);
 }
 
 TEST_F(AcquisitionTest, ACompleteSetIsRefusedBeforeAnythingMoves) {

@@ -182,10 +182,13 @@ TEST_F(RigTest, SaysWhereEveryActuatorStandsAndLeavesOutWhatIsNotKnown) {
   EXPECT_EQ(actuators[0].name, "table");
   EXPECT_EQ(actuators[0].unit, "deg");
   EXPECT_EQ(actuators[0].position, 42.0);
+  EXPECT_EQ(actuators[0].tolerance, 0.5);
+  EXPECT_DOUBLE_EQ(actuators[0].distance_from(352.0), 50.0) << "through the seam of a turn";
   EXPECT_FALSE(actuators[1].position) << "not homed";
   EXPECT_FALSE(actuators[2].position) << "not there";
   EXPECT_EQ(actuators[3].unit, "level");
   EXPECT_EQ(actuators[3].position, 0.8);
+  EXPECT_DOUBLE_EQ(actuators[3].distance_from(0.5), 0.3);
 }
 
 TEST_F(RigTest, AMoveThatTakesLongerThanItMayIsOverdue) {
