@@ -45,8 +45,12 @@ void add_acquire_command(CLI::App& app, CommandLine& line) {
       "Put the object on the turntable first. Ctrl-C stops the table; what was taken is kept, and the same "
       "command "
       "continues there.\n\nExample: eigenpose acquire mug --plan lights");
-  command->callback(
-      [options, &line] { line.action = [options, &line] { return run_acquire(*options, line.stop); }; });
+  command->callback([options, &line] {
+    line.action = [options, &line] {
+      const DevicesInHand in_hand(line);  // the service's: it must hear that the table is to stop
+      return run_acquire(*options, line.stop);
+    };
+  });
 }
 
 }  // namespace eigenpose::cli

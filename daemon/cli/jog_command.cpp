@@ -35,6 +35,7 @@ void add_jog_command(CLI::App& app, CommandLine& line) {
       "eigenposed.");
   command->callback([options, &line] {
     line.action = [options, &line] {
+      const DevicesInHand in_hand(line);
       const SteadyClock clock;
       HandControl hands(options->rig.read(), clock);
       if (options->home_first) hands.home(options->axis, line.stop);
@@ -62,6 +63,7 @@ void add_home_command(CLI::App& app, CommandLine& line) {
       "systemctl stop eigenposed.");
   command->callback([options, &line] {
     line.action = [options, &line] {
+      const DevicesInHand in_hand(line);
       const SteadyClock clock;
       HandControl hands(options->rig.read(), clock);
       for (const std::string& axis : options->axes.empty() ? hands.axis_names() : options->axes) {

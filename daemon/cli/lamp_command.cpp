@@ -34,6 +34,7 @@ void add_lamp_command(CLI::App& app, CommandLine& line) {
       "While eigenposed runs it holds the lamps: systemctl stop eigenposed.");
   command->callback([options, &line] {
     line.action = [options, &line] {
+      const DevicesInHand in_hand(line);
       const SteadyClock clock;
       HandControl hands(options->rig.read(), clock);
       hands.light(options->lamp, options->level);

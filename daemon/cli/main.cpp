@@ -63,36 +63,50 @@ Start here:
 'eigenpose COMMAND --help' explains one command, with examples.
 Exit code: 0 done, 1 failed (one line on stderr says why), 2 usage error, 130 interrupted.)";
 
-/// Waits for SIGINT and SIGTERM on a thread of its own. The first asks for a stop, the second ends the
-/// program.
+/// Waits for SIGINT, SIGTERM and SIGHUP on a thread of its own. The first asks for a stop, the second ends
+/// the program; but as long as devices are in its hands, it only says what it waits for.
 class SignalWatch {
  public:
-  SignalWatch() {
+  /// @param line outlives it; its `stop` is set.
+  explicit SignalWatch(CommandLine& line) : line_(line) {
+    line.stop = source_.get_token();
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
+    struct sigaction hangup {};
+    // Under nohup the closed terminal is ignored, and stays so.
+    if (sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN)
+      sigaddset(&signals_, SIGHUP);
     // Before any other thread exists, so that all of them inherit the mask.
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-    watcher_ = std::thread([this] {
-      for (int count = 0;; ++count) {
-        int signal = 0;
-        if (sigwait(&signals_, &signal) != 0) continue;
-        if (ending_) return;
-        if (count > 0) _exit(exit_interrupted);
-        source_.request_stop();
-      }
-    });
+    watcher_ = std::thread([this] { watch(); });
   }
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
   ~SignalWatch() {
     ending_ = true;
-    pthread_kill(watcher_.native_handle(), SIGTERM);
+    pthread_kill(watcher_.native_handle(), SIGINT);
     watcher_.join();
   }
-  [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
 
  private:
+  void watch() {
+    for (int count = 0;; ++count) {
+      int signal = 0;
+      while (sigwait(&signals_, &signal) != 0) continue;
+      if (ending_) return;
+      if (count == 0)
+        source_.request_stop();
+      else if (line_.devices_in_hand == 0)
+        _exit(exit_interrupted);
+      else if (count == 1)
+        warn(
+            "ends as soon as its devices have been told to stop; a motor that does not stop needs its "
+            "emergency stop");
+    }
+  }
+
+  CommandLine& line_;
   sigset_t signals_{};
   std::stop_source source_;
   std::atomic<bool> ending_{false};
@@ -158,9 +172,8 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
 
 int run(int argc, char** argv) {
   prepare_output();
-  SignalWatch signals;
   CommandLine line;
-  line.stop = signals.token();
+  const SignalWatch signals(line);
 
   CLI::App app(about, "eigenpose");
   app.set_version_flag("--version", std::string("eigenpose ") + EIGENPOSE_VERSION);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -192,6 +193,97 @@ TEST_F(DrivenByHand, NothingMovesWhileTheServiceHoldsTheRig) {
   const auto [code, words] = eigenpose({"jog", "table", "90", "--home"}, "run");
   EXPECT_EQ(code, 0) << words;
   EXPECT_NEAR(table_deg(), 90.0, 0.05);
+}
+
+/// A table and a dimmer that stop and go dark for nobody but who tells them to: the drive's own watchdog is
+/// off.
+class InTheHandsOfACommand : public DrivenByHand {
+ protected:
+  static constexpr std::uint16_t dimmer = 0x0068;  // a spare register of the drive
+
+  InTheHandsOfACommand() {
+    std::string profile =
+        text_of(std::string(EIGENPOSE_SOURCE_DIR) + "/config/profiles/oriental_motor_az.toml");
+    const std::string watchdog = "watchdog_ms = 2000";
+    EXPECT_NE(profile.find(watchdog), std::string::npos);
+    profile.replace(profile.find(watchdog), watchdog.size(), "watchdog_ms = 0");
+    std::ofstream(folder_.path() / "table.toml") << profile;
+    std::ofstream(folder_.path() / "dimmer.toml")
+        << "format = 1\nkind = \"lamp\"\nmodel = \"dimmer\"\nword_order = \"high_first\"\nfull = 1000\n[commands]\n"
+        << "set_level = [{ register = 0x68, values = [\"level:32\"] }]\n";
+    const std::string endpoint = "endpoint = \"tcp://127.0.0.1:" + std::to_string(drives_.port()) + "\"\n";
+    std::ofstream(rig_) << "[daemon]\nruntime_dir = \"run\"\nstate_dir = \"state\"\n"
+                        << "[[axis]]\nname = \"table\"\ndriver = \"modbus\"\nstation = 1\n"
+                        << "profile = \"table.toml\"\n"
+                        << endpoint << "[[lamp]]\nname = \"key\"\ndriver = \"modbus\"\nstation = 2\n"
+                        << "profile = \"dimmer.toml\"\n"
+                        << endpoint;
+  }
+  /// Begins a long turn of the table and waits until it turns.
+  std::unique_ptr<Program> begin_to_turn() {
+    EXPECT_EQ(eigenpose({"home", "table"}, "run").first, 0) << text_of(words_);
+    drives_.drive(1).set_speed_factor(0.5);
+    const double before = table_deg();
+    auto program = std::make_unique<Program>(
+        EIGENPOSE, std::vector<std::string>{"jog", "table", "170", "--config", rig_.string()}, words_);
+    while (table_deg() == before && !has_ended(*program)) std::this_thread::yield();
+    return program;
+  }
+  static bool has_ended(const Program& program) {
+    siginfo_t information{};
+    ::waitid(P_PID, static_cast<id_t>(program.process()), &information, WEXITED | WNOHANG | WNOWAIT);
+    return information.si_pid != 0;
+  }
+  /// Two signals of which the second finds the first one's work not done: the line is dead until then.
+  void signal_twice(const Program& program) {
+    drives_.faults().at_random(1.0, 1, {{sim::WireFaultKind::loss}});
+    program.signal(SIGINT);
+    program.signal(SIGTERM);
+    while (!has_ended(program) && text_of(words_).find("as soon as its devices") == std::string::npos)
+      std::this_thread::yield();
+    drives_.faults().clear();
+  }
+  /// Waits until the table stands.
+  double table_at_rest() {
+    double before = table_deg();
+    for (TimePoint since = clock_.now(); clock_.now() - since < std::chrono::milliseconds(20);) {
+      if (table_deg() == before) continue;
+      before = table_deg();
+      since = clock_.now();
+    }
+    return before;
+  }
+  int dimmed() {
+    std::array<std::uint16_t, 2> registers{};
+    drives_.drive(2).read(dimmer, registers);
+    return registers[0] * 65536 + registers[1];
+  }
+  static constexpr double well_before_the_target = 160.0;
+
+  std::filesystem::path words_ = folder_.path() / "words";
+};
+
+TEST_F(InTheHandsOfACommand, TheTableStopsWhenTheTerminalIsClosed) {
+  const std::unique_ptr<Program> jog = begin_to_turn();
+  jog->signal(SIGHUP);
+  EXPECT_EQ(jog->wait(), 130) << text_of(words_);
+  EXPECT_LT(table_at_rest(), well_before_the_target);
+  EXPECT_THAT(text_of(words_), HasSubstr("interrupted on request; the drive was told to stop"));
+}
+
+TEST_F(InTheHandsOfACommand, ASecondSignalDoesNotEndTheProgramBeforeTheTableWasToldToStop) {
+  const std::unique_ptr<Program> jog = begin_to_turn();
+  signal_twice(*jog);
+  EXPECT_EQ(jog->wait(), 130) << text_of(words_);
+  EXPECT_LT(table_at_rest(), well_before_the_target);
+}
+
+TEST_F(InTheHandsOfACommand, ASecondSignalDoesNotEndTheProgramBeforeTheLampIsDark) {
+  Program lamp(EIGENPOSE, {"lamp", "key", "0.5", "--config", rig_.string()}, words_);
+  while (dimmed() != 500 && !has_ended(lamp)) std::this_thread::yield();
+  signal_twice(lamp);
+  EXPECT_EQ(lamp.wait(), 0) << text_of(words_);
+  EXPECT_EQ(dimmed(), 0);
 }
 
 TEST_F(DaemonProcess, ReplacesTheSocketsOfOneThatWasKilled) {
