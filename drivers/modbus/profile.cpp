@@ -69,13 +69,13 @@ std::int64_t filled(const RegisterValue& value, const RegisterFill& fill) {
 RegisterRange range_of(const RegisterValue& value, const RegisterFill& fill) {
   switch (value.meaning) {
     case RegisterMeaning::constant:
-      return {register_range(value.bits, true).least, register_range(value.bits, false).most};
+      return {signed_range(value.bits).least, unsigned_range(value.bits).most};
     case RegisterMeaning::position:
-      return register_range(value.bits, fill.position_is_signed);
+      return fill.position_is_signed ? signed_range(value.bits) : unsigned_range(value.bits);
     case RegisterMeaning::distance:
-      return register_range(value.bits, true);
+      return signed_range(value.bits);
     default:
-      return register_range(value.bits, false);
+      return unsigned_range(value.bits);
   }
 }
 
@@ -116,7 +116,7 @@ void ModbusLampProfile::check() const {
   if (!mentions(set_level, RegisterMeaning::level)) refuse(model, "the set_level command writes no level");
   if (full < 1) refuse(model, fmt::format("full = {} is not above 0", full));
   const int bits = register_of(set_level, RegisterMeaning::level)->bits;
-  if (!register_range(bits, false).contains(full))
+  if (!unsigned_range(bits).contains(full))
     refuse(model, fmt::format("full = {} does not fit the {} bits of the level", full, bits));
 }
 
@@ -143,17 +143,22 @@ std::optional<RegisterNumber> register_of(const RegisterWrites& writes, Register
   return std::nullopt;
 }
 
-RegisterRange register_range(int bits, bool is_signed) {
-  const std::int64_t span = std::int64_t{1} << bits;
-  return is_signed ? RegisterRange{-span / 2, span / 2 - 1} : RegisterRange{0, span - 1};
+RegisterRange signed_range(int bits) {
+  const std::int64_t half = std::int64_t{1} << (bits - 1);
+  return {-half, half - 1};
+}
+
+RegisterRange unsigned_range(int bits) {
+  return {0, (std::int64_t{1} << bits) - 1};
 }
 
 RegisterRange counter_range(const ModbusProfile& profile) {
-  RegisterRange range = register_range(profile.position.bits, profile.position.is_signed);
+  const auto range_of_bits = profile.position.is_signed ? signed_range : unsigned_range;
+  RegisterRange range = range_of_bits(profile.position.bits);
   for (const RegisterWrite& write : profile.move)
     for (const RegisterValue& value : write.values) {
       if (value.meaning != RegisterMeaning::position) continue;
-      const RegisterRange target = register_range(value.bits, profile.position.is_signed);
+      const RegisterRange target = range_of_bits(value.bits);
       range = {std::max(range.least, target.least), std::min(range.most, target.most)};
     }
   return range;

@@ -151,7 +151,8 @@ struct RegisterRange {
 };
 
 /// Of a number of so many bits, 16 or 32.
-RegisterRange register_range(int bits, bool is_signed);
+RegisterRange signed_range(int bits);
+RegisterRange unsigned_range(int bits);
 
 /// The counts that the drive can both be sent to by the profile's `move` and show as its position.
 RegisterRange counter_range(const ModbusProfile& profile);
