@@ -74,10 +74,13 @@ std::size_t BufferLayout::bytes() const {
   return 0;
 }
 
-PixelDecoder::PixelDecoder(const BufferLayout& layout, bool color) : layout_(layout), color_(color) {
-  if (color && layout.format == PixelFormat::grey)
+PixelDecoder::PixelDecoder(const BufferLayout& layout, PictureKind kind) : layout_(layout), kind_(kind) {
+  if (kind == PictureKind::color && layout.format == PixelFormat::grey)
     throw std::invalid_argument("GREY has no colour to decode");
-  if (layout.format == PixelFormat::mjpeg) mjpeg_ = std::make_unique<MjpegDecoder>();
+  if (layout.format == PixelFormat::mjpeg)
+    mjpeg_ = std::make_unique<MjpegDecoder>();
+  else if (kind == PictureKind::color && layout.range == LumaRange::full)
+    ycrcb_.create(layout.height, layout.width, CV_8UC3);
 }
 
 PixelDecoder::~PixelDecoder() = default;
@@ -85,21 +88,29 @@ PixelDecoder::~PixelDecoder() = default;
 FrameFault PixelDecoder::decode(std::span<const std::uint8_t> buffer, cv::Mat& picture) {
   if (layout_.format == PixelFormat::mjpeg) return mjpeg_->decode(buffer, picture);
   if (buffer.size() < layout_.bytes()) return FrameFault::too_short;
+  if (kind_ == PictureKind::grey)
+    decode_luma(buffer.data(), picture);
+  else if (layout_.range == LumaRange::limited)
+    decode_limited_color(buffer, picture);
+  else
+    decode_full_color(buffer.data(), picture);
+  return FrameFault::none;
+}
 
-  if (!color_) {
-    const auto pixels = static_cast<std::size_t>(layout_.width);
-    for (int row = 0; row < layout_.height; ++row) {
-      const std::uint8_t* from = buffer.data() + static_cast<std::size_t>(row) * layout_.stride;
-      if (layout_.format == PixelFormat::yuyv) {
-        luma_of_yuyv(from, picture.ptr(row), pixels, layout_.range);
-      } else {
-        copy_luma(from, picture.ptr(row), pixels, layout_.range);
-      }
+void PixelDecoder::decode_luma(const std::uint8_t* data, cv::Mat& picture) const {
+  const auto pixels = static_cast<std::size_t>(layout_.width);
+  for (int row = 0; row < layout_.height; ++row) {
+    const std::uint8_t* from = data + static_cast<std::size_t>(row) * layout_.stride;
+    if (layout_.format == PixelFormat::yuyv) {
+      luma_of_yuyv(from, picture.ptr(row), pixels, layout_.range);
+    } else {
+      copy_luma(from, picture.ptr(row), pixels, layout_.range);
     }
-    return FrameFault::none;
   }
+}
 
-  // OpenCV only reads through these headers.
+void PixelDecoder::decode_limited_color(std::span<const std::uint8_t> buffer, cv::Mat& picture) const {
+  // OpenCV only reads through these headers. Its YUYV and NV12 are of limited range.
   auto* data = const_cast<std::uint8_t*>(buffer.data());
   if (layout_.format == PixelFormat::yuyv) {
     const cv::Mat yuyv(layout_.height, layout_.width, CV_8UC2, data, layout_.stride);
@@ -110,7 +121,30 @@ FrameFault PixelDecoder::decode(std::span<const std::uint8_t> buffer, cv::Mat& p
                          data + layout_.stride * static_cast<std::size_t>(layout_.height), layout_.stride);
     cv::cvtColorTwoPlane(luma, chroma, picture, cv::COLOR_YUV2BGR_NV12);
   }
-  return FrameFault::none;
+}
+
+void PixelDecoder::decode_full_color(const std::uint8_t* data, cv::Mat& picture) {
+  const bool packed = layout_.format == PixelFormat::yuyv;
+  const auto row_at = [&](int row) { return data + static_cast<std::size_t>(row) * layout_.stride; };
+  for (int row = 0; row < layout_.height; ++row) {
+    const std::uint8_t* luma = row_at(row);
+    // YUYV: Y U Y V …; NV12: U V … of two rows, behind all luma.
+    const std::uint8_t* chroma = packed ? luma + 1 : row_at(layout_.height + row / 2);
+    std::uint8_t* to = ycrcb_.ptr(row);
+    for (int column = 0; column < layout_.width; column += 2) {
+      const std::uint8_t u = chroma[0];
+      const std::uint8_t v = chroma[packed ? 2 : 1];
+      for (int pixel = 0; pixel < 2; ++pixel, to += 3) {
+        to[0] = *luma;
+        to[1] = v;
+        to[2] = u;
+        luma += packed ? 2 : 1;
+      }
+      chroma += packed ? 4 : 2;
+    }
+  }
+  // The colours of JPEG: BT.601 of full range.
+  cv::cvtColor(ycrcb_, picture, cv::COLOR_YCrCb2BGR);
 }
 
 }  // namespace eigenpose

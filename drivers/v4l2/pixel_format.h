@@ -40,22 +40,33 @@ struct BufferLayout {
 
 class MjpegDecoder;
 
+/// What is made of a buffer.
+enum class PictureKind {
+  grey,  ///< CV_8UC1: luma alone is read
+  color  ///< CV_8UC3, BGR
+};
+
 /// Makes pictures of one layout. Lives on one thread.
 class PixelDecoder {
  public:
-  /// @param color BGR pictures; otherwise grey ones. GREY cannot give colour (std::invalid_argument).
-  PixelDecoder(const BufferLayout& layout, bool color);
+  /// GREY cannot give colour (std::invalid_argument).
+  PixelDecoder(const BufferLayout& layout, PictureKind kind);
   ~PixelDecoder();
 
   /// CV_8UC3 or CV_8UC1.
-  [[nodiscard]] int picture_type() const { return color_ ? CV_8UC3 : CV_8UC1; }
+  [[nodiscard]] int picture_type() const { return kind_ == PictureKind::color ? CV_8UC3 : CV_8UC1; }
   /// Fills `picture`, which has the layout's size and `picture_type`.
   /// @return what is wrong with the buffer; `picture` is then undefined.
   FrameFault decode(std::span<const std::uint8_t> buffer, cv::Mat& picture);
 
  private:
+  void decode_luma(const std::uint8_t* data, cv::Mat& picture) const;
+  void decode_limited_color(std::span<const std::uint8_t> buffer, cv::Mat& picture) const;
+  void decode_full_color(const std::uint8_t* data, cv::Mat& picture);
+
   BufferLayout layout_;
-  bool color_;
+  PictureKind kind_;
+  cv::Mat ycrcb_;                        ///< CV_8UC3, for colour of full range only
   std::unique_ptr<MjpegDecoder> mjpeg_;  ///< for MJPEG only
 };
 

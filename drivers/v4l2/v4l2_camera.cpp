@@ -216,8 +216,8 @@ void V4l2Camera::set_mode(Session& session, OpeningReport& report) const {
   report.granted.frames_per_second = set_rate(device, best->frames_per_second);
   session.interval = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(1.0 / report.granted.frames_per_second));
-  session.decoder =
-      std::make_unique<PixelDecoder>(layout_of(format.fmt.pix, best->format), options_.mode.color);
+  session.decoder = std::make_unique<PixelDecoder>(
+      layout_of(format.fmt.pix, best->format), options_.mode.color ? PictureKind::color : PictureKind::grey);
 }
 
 void V4l2Camera::set_controls(CameraControls& controls, OpeningReport& report) const {

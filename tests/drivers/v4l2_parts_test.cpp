@@ -103,56 +103,80 @@ TEST(Luma, LimitedRangeIsSpreadToTheNearestByte) {
   }
 }
 
-/// BT.601 in floating point, limited range.
-cv::Vec3d exact_bgr(double y, double u, double v) {
-  const double luma = 255.0 / 219.0 * (y - 16.0);
-  const double blue = (u - 128.0) * 255.0 / 224.0;
-  const double red = (v - 128.0) * 255.0 / 224.0;
+/// BT.601 in floating point.
+cv::Vec3d exact_bgr(double y, double u, double v, LumaRange range) {
+  const bool limited = range == LumaRange::limited;
+  const double luma = limited ? 255.0 / 219.0 * (y - 16.0) : y;
+  const double chroma_scale = limited ? 255.0 / 224.0 : 1.0;
+  const double blue = (u - 128.0) * chroma_scale;
+  const double red = (v - 128.0) * chroma_scale;
   return {luma + 1.772 * blue, luma - 0.344136 * blue - 0.714136 * red, luma + 1.402 * red};
 }
 
-TEST(PixelDecoder, MakesYuyvAndNv12IntoTheSameBgr) {
-  constexpr int width = 34, height = 8, padding = 6;
-  std::mt19937 random(2);
-  std::uniform_int_distribution<int> luma_of(16, 235), chroma_of(64, 192);
-  const std::size_t stride = 2 * width + padding, nv12_stride = width + padding;
-  std::vector<std::uint8_t> yuyv(stride * height), nv12(nv12_stride * height * 3 / 2);
-  cv::Mat_<cv::Vec3d> exact(height, width);
-  for (int row = 0; row < height; row += 2) {
-    for (int column = 0; column < width; column += 2) {
-      const int u = chroma_of(random), v = chroma_of(random);
-      std::uint8_t* chroma = nv12.data() + nv12_stride * static_cast<std::size_t>(height + row / 2) + column;
-      chroma[0] = static_cast<std::uint8_t>(u);
-      chroma[1] = static_cast<std::uint8_t>(v);
-      for (int dy = 0; dy < 2; ++dy) {
-        for (int dx = 0; dx < 2; ++dx) {
-          const int y = luma_of(random);
+/// The same random picture in both formats, and what it should become.
+struct ColorBuffers {
+  static constexpr int width = 34, height = 8, padding = 6;
+  static constexpr std::size_t stride = 2 * width + padding, nv12_stride = width + padding;
+
+  explicit ColorBuffers(LumaRange range)
+      : yuyv(stride * height), nv12(nv12_stride * height * 3 / 2), exact(height, width) {
+    std::mt19937 random(2);
+    const bool limited = range == LumaRange::limited;
+    std::uniform_int_distribution<int> luma_of(limited ? 16 : 0, limited ? 235 : 255), chroma_of(64, 192);
+    for (int row = 0; row < height; row += 2)
+      for (int column = 0; column < width; column += 2) {
+        const int u = chroma_of(random), v = chroma_of(random);
+        std::uint8_t* chroma =
+            nv12.data() + nv12_stride * static_cast<std::size_t>(height + row / 2) + column;
+        chroma[0] = static_cast<std::uint8_t>(u);
+        chroma[1] = static_cast<std::uint8_t>(v);
+        for (int pixel = 0; pixel < 4; ++pixel) {
+          const int y = luma_of(random), dy = pixel / 2, dx = pixel % 2;
           nv12[nv12_stride * static_cast<std::size_t>(row + dy) + static_cast<std::size_t>(column + dx)] =
               static_cast<std::uint8_t>(y);
           std::uint8_t* pair = yuyv.data() + stride * static_cast<std::size_t>(row + dy) + 2 * column;
           pair[2 * dx] = static_cast<std::uint8_t>(y);
           pair[1] = static_cast<std::uint8_t>(u);
           pair[3] = static_cast<std::uint8_t>(v);
-          exact(row + dy, column + dx) = exact_bgr(y, u, v);
+          exact(row + dy, column + dx) = exact_bgr(y, u, v, range);
         }
       }
+  }
+
+  std::vector<std::uint8_t> yuyv, nv12;
+  cv::Mat_<cv::Vec3d> exact;
+};
+
+TEST(PixelDecoder, MakesYuyvAndNv12OfEitherRangeIntoTheSameBgr) {
+  for (const LumaRange range : {LumaRange::limited, LumaRange::full}) {
+    const ColorBuffers buffers(range);
+    for (const PixelFormat format : {PixelFormat::yuyv, PixelFormat::nv12}) {
+      const bool packed = format == PixelFormat::yuyv;
+      PixelDecoder decoder({format, ColorBuffers::width, ColorBuffers::height,
+                            packed ? ColorBuffers::stride : ColorBuffers::nv12_stride, range},
+                           PictureKind::color);
+      cv::Mat picture(ColorBuffers::height, ColorBuffers::width, CV_8UC3);
+      ASSERT_EQ(decoder.decode(packed ? buffers.yuyv : buffers.nv12, picture), FrameFault::none);
+      for (int row = 0; row < picture.rows; ++row)
+        for (int column = 0; column < picture.cols; ++column)
+          for (int channel = 0; channel < 3; ++channel) {
+            const double expected = std::clamp(buffers.exact(row, column)[channel], 0.0, 255.0);
+            // One for rounding, one for coefficients of three digits.
+            ASSERT_NEAR(picture.at<cv::Vec3b>(row, column)[channel], expected, 2.0) << name_of(format);
+          }
     }
   }
-  for (const PixelFormat format : {PixelFormat::yuyv, PixelFormat::nv12}) {
-    const bool packed = format == PixelFormat::yuyv;
-    PixelDecoder decoder({format, width, height, packed ? stride : nv12_stride, LumaRange::limited}, true);
-    cv::Mat picture(height, width, CV_8UC3);
-    ASSERT_EQ(decoder.decode(packed ? yuyv : nv12, picture), FrameFault::none);
-    for (int row = 0; row < height; ++row) {
-      for (int column = 0; column < width; ++column) {
-        for (int channel = 0; channel < 3; ++channel) {
-          const double expected = std::clamp(exact(row, column)[channel], 0.0, 255.0);
-          // One for rounding, one for coefficients of three digits.
-          ASSERT_NEAR(picture.at<cv::Vec3b>(row, column)[channel], expected, 2.0) << name_of(format);
-        }
-      }
-    }
-  }
+}
+
+TEST(PixelDecoder, WritesColorOfFullRangeIntoThePictureItIsGiven) {
+  const ColorBuffers buffers(LumaRange::full);
+  PixelDecoder decoder(
+      {PixelFormat::yuyv, ColorBuffers::width, ColorBuffers::height, ColorBuffers::stride, LumaRange::full},
+      PictureKind::color);
+  cv::Mat picture(ColorBuffers::height, ColorBuffers::width, CV_8UC3);
+  const std::uint8_t* memory = picture.data;
+  ASSERT_EQ(decoder.decode(buffers.yuyv, picture), FrameFault::none);
+  EXPECT_EQ(picture.data, memory) << "the pool's memory, not new one";
 }
 
 TEST(PixelDecoder, ReadsLumaOfEveryFormatTheSame) {
@@ -163,7 +187,8 @@ TEST(PixelDecoder, ReadsLumaOfEveryFormatTheSame) {
   const cv::Mat expected(height, width, CV_8UC1, const_cast<std::uint8_t*>(luma.data()));
   const auto decoded = [&](PixelFormat format, std::size_t stride, const std::vector<std::uint8_t>& bytes) {
     cv::Mat picture(height, width, CV_8UC1);
-    EXPECT_EQ(PixelDecoder({format, width, height, stride, LumaRange::full}, false).decode(bytes, picture),
+    EXPECT_EQ(PixelDecoder({format, width, height, stride, LumaRange::full}, PictureKind::grey)
+                  .decode(bytes, picture),
               FrameFault::none);
     return picture;
   };
@@ -173,7 +198,7 @@ TEST(PixelDecoder, ReadsLumaOfEveryFormatTheSame) {
 }
 
 TEST(PixelDecoder, RefusesABufferThatIsTooShort) {
-  PixelDecoder decoder({PixelFormat::yuyv, 16, 4, 32, LumaRange::limited}, true);
+  PixelDecoder decoder({PixelFormat::yuyv, 16, 4, 32, LumaRange::limited}, PictureKind::color);
   cv::Mat picture(4, 16, CV_8UC3);
   EXPECT_EQ(decoder.decode(std::vector<std::uint8_t>(32 * 4 - 1), picture), FrameFault::too_short);
   EXPECT_EQ(decoder.decode(std::vector<std::uint8_t>(32 * 4), picture), FrameFault::none);
@@ -219,10 +244,12 @@ TEST(MjpegDecoding, GivesThePictureInColourAndInGrey) {
   const auto jpeg = encoded(picture);
   cv::Mat color(48, 64, CV_8UC3), grey(48, 64, CV_8UC1), expected_grey;
   cv::cvtColor(picture, expected_grey, cv::COLOR_BGR2GRAY);
-  ASSERT_EQ(PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true).decode(jpeg, color),
-            FrameFault::none);
-  ASSERT_EQ(PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, false).decode(jpeg, grey),
-            FrameFault::none);
+  ASSERT_EQ(
+      PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, PictureKind::color).decode(jpeg, color),
+      FrameFault::none);
+  ASSERT_EQ(
+      PixelDecoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, PictureKind::grey).decode(jpeg, grey),
+      FrameFault::none);
   // What quality 95 loses on a smooth gradient, on average.
   EXPECT_LT(cv::norm(color, picture, cv::NORM_L1) / (64 * 48 * 3), 2.0);
   EXPECT_LT(cv::norm(grey, expected_grey, cv::NORM_L1) / (64 * 48), 2.0);
@@ -232,7 +259,7 @@ TEST(MjpegDecoding, UsesTheStandardTablesWhereTheCameraSendsNone) {
   const auto jpeg = encoded(gradient());
   const auto stripped = without_tables(jpeg);
   ASSERT_LT(stripped.size(), jpeg.size() - 300);
-  PixelDecoder decoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true);
+  PixelDecoder decoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, PictureKind::color);
   cv::Mat whole(48, 64, CV_8UC3), bare(48, 64, CV_8UC3);
   ASSERT_EQ(decoder.decode(stripped, bare), FrameFault::none);
   ASSERT_EQ(decoder.decode(jpeg, whole), FrameFault::none);
@@ -241,7 +268,7 @@ TEST(MjpegDecoding, UsesTheStandardTablesWhereTheCameraSendsNone) {
 
 TEST(MjpegDecoding, SurvivesEveryKindOfDamageAndDecodesTheNextFrame) {
   const auto jpeg = encoded(gradient());
-  PixelDecoder decoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, true);
+  PixelDecoder decoder({PixelFormat::mjpeg, 64, 48, 0, LumaRange::full}, PictureKind::color);
   cv::Mat picture(48, 64, CV_8UC3);
   for (std::size_t length = 0; length + 2 < jpeg.size(); length += 7) {
     EXPECT_NE(decoder.decode(std::span(jpeg).first(length), picture), FrameFault::none) << length;
