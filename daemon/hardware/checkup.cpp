@@ -13,6 +13,7 @@
 #include "core/base/error.h"
 #include "daemon/api/client/local_address.h"
 #include "drivers/modbus/endpoint.h"
+#include "drivers/v4l2/v4l2_camera.h"
 
 namespace eigenpose {
 namespace {
@@ -180,15 +181,17 @@ void check_service_user(const Machine& machine, const Report& report) {
 void check_camera_node(const Machine& machine, const CameraOptions& camera, const Inventory& inventory,
                        const Report& report) {
   if (camera.driver != "v4l2") return;
+  const CameraSelector selector{camera.serial, camera.bus_path, "", camera.device.string()};
+  const VideoNode* forbidden = nullptr;
+  bool usable = false;
   for (const CameraFound& found : inventory.cameras) {
-    const bool meant = (camera.serial.empty() || camera.serial == found.node.serial) &&
-                       (camera.device.empty() || camera.device == found.node.path) &&
-                       (camera.bus_path.empty() || camera.bus_path == found.node.port ||
-                        camera.bus_path == found.node.bus_info);
-    if (meant && found.node.open_error == EACCES) {
-      check_node(machine, "camera", found.node.path, false, report);
-      return;
-    }
+    if (!is_meant(found.node, selector)) continue;
+    usable = usable || (found.node.open_error == 0 && found.node.can_capture);
+    if (found.node.open_error == EACCES) forbidden = &found.node;
+  }
+  if (forbidden != nullptr && !usable) {
+    check_node(machine, "camera", forbidden->path, false, report);
+    return;
   }
   if (camera.serial.empty() && camera.bus_path.empty()) {
     report({Health::note, "camera", "the configuration names neither serial number nor bus path",

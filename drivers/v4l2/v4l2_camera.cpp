@@ -12,14 +12,6 @@
 namespace eigenpose {
 namespace {
 
-bool fits(const VideoNode& node, const CameraSelector& selector) {
-  return (selector.serial.empty() || selector.serial == node.serial) &&
-         (selector.bus_path.empty() || selector.bus_path == node.bus_info ||
-          selector.bus_path == node.port) &&
-         (selector.name.empty() || selector.name == node.name) &&
-         (selector.node.empty() || selector.node == node.path);
-}
-
 std::string describe(const CameraSelector& selector) {
   std::string text;
   const auto add = [&](const char* what, const std::string& value) {
@@ -98,20 +90,25 @@ double set_rate(VideoDevice& device, double wanted) {
 
 }  // namespace
 
+bool is_meant(const VideoNode& node, CameraSelector selector) {
+  // The bus_info of a node that cannot be opened is not known, so a bus path cannot rule it out.
+  if (node.open_error != 0) selector.bus_path.clear();
+  return (selector.serial.empty() || selector.serial == node.serial) &&
+         (selector.bus_path.empty() || selector.bus_path == node.bus_info ||
+          selector.bus_path == node.port) &&
+         (selector.name.empty() || selector.name == node.name) &&
+         (selector.node.empty() || selector.node == node.path);
+}
+
 const VideoNode& find_camera(const std::vector<VideoNode>& nodes, const CameraSelector& selector,
                              const std::string& device_name) {
   const std::string operation = "looking for " + describe(selector);
   const VideoNode* found = nullptr;
   const VideoNode* forbidden = nullptr;
   for (const VideoNode& node : nodes) {
-    if (node.open_error != 0) {
-      // Its bus_info is not known then, so a bus path cannot rule it out.
-      CameraSelector without_bus = selector;
-      without_bus.bus_path.clear();
-      if (fits(node, without_bus)) forbidden = &node;
-      continue;
-    }
-    if (!node.can_capture || !fits(node, selector)) continue;
+    if (!is_meant(node, selector)) continue;
+    if (node.open_error != 0) forbidden = &node;
+    if (node.open_error != 0 || !node.can_capture) continue;
     if (found != nullptr && found->port != node.port) {
       throw DeviceError(device_name, operation,
                         "several fit; give its serial or bus path; " + describe(nodes));

@@ -27,6 +27,10 @@ struct CameraSelector {
   std::string node;  ///< "/dev/video0"; changes with the order of plugging in, so only for trying things out
 };
 
+/// Whether `node` is one of the device that is meant. Of a node that may not be opened the bus path may be
+/// not known: then it decides nothing.
+bool is_meant(const VideoNode& node, CameraSelector selector);
+
 /// The camera meant among `nodes`; of several nodes of one device the first. @throws DeviceLost when there is
 /// none, DeviceError when several devices fit or the node may not be opened; the text lists what is there.
 const VideoNode& find_camera(const std::vector<VideoNode>& nodes, const CameraSelector& selector,

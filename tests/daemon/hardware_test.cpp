@@ -1,5 +1,6 @@
 /// The operator's hands and eyes: limits of jogging, and what the doctor says of a machine.
 
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -238,6 +239,45 @@ TEST_F(CheckupTest, ListsAnFtdiDeviceWithItsSerialAndNode) {
   EXPECT_EQ(found.usb[0].serial, "83123456");
   EXPECT_EQ(found.usb[0].name, "Thorlabs APT DC Motor Controller");
   EXPECT_EQ(found.usb[0].node, (root_ / "dev/bus/usb/001/004").string());
+}
+
+TEST_F(CheckupTest, ACameraThatMayNotBeOpenedIsAFaultWhereItIsTheOneThatTheServiceWouldTake) {
+  put("dev/video0", "");
+  config_.camera.emplace();
+  config_.camera->driver = "v4l2";
+  Inventory inventory;
+  VideoNode forbidden;
+  forbidden.path = (root_ / "dev/video0").string();
+  forbidden.serial = "S1";
+  forbidden.port = "1-1";
+  forbidden.open_error = EACCES;
+  inventory.cameras.emplace_back().node = forbidden;
+  const auto faults = [&] {
+    int count = 0;
+    check_machine(machine_, config_, inventory, [&](const Finding& finding) {
+      count += finding.subject == "camera" && finding.health == Health::fault ? 1 : 0;
+    });
+    return count;
+  };
+  EXPECT_EQ(faults(), 1) << "any camera";
+  config_.camera->serial = "S2";
+  EXPECT_EQ(faults(), 0) << "another one";
+  config_.camera->serial = "S1";
+  EXPECT_EQ(faults(), 1);
+  config_.camera->bus_path = "usb-0000:00:14.0-1";
+  EXPECT_EQ(faults(), 1) << "what cannot be opened does not say its bus";
+  config_.camera->device = "/dev/video7";
+  EXPECT_EQ(faults(), 0);
+
+  config_.camera->serial.clear();
+  config_.camera->bus_path.clear();
+  config_.camera->device.clear();
+  VideoNode& usable = inventory.cameras.emplace_back().node;
+  usable.path = "/dev/video1";
+  usable.can_capture = true;
+  EXPECT_EQ(faults(), 0) << "the one that can be opened is taken";
+  usable.can_capture = false;
+  EXPECT_EQ(faults(), 1) << "a node of metadata is no camera";
 }
 
 TEST_F(CheckupTest, SaysWhatToPlugInWhenTheSerialNumberIsNotThere) {

@@ -149,6 +149,21 @@ TEST(FindCamera, OfTwoCamerasWantsToKnowWhich) {
   EXPECT_EQ(find_camera(nodes, {"", "", "B", ""}, "camera").path, "/dev/video2");
 }
 
+TEST(FindCamera, MeansADeviceByEveryThingThatIsSaidOfIt) {
+  const VideoNode node{"/dev/video0", "A", "uvcvideo", "usb-1", "1-1", "S1", true, 0};
+  EXPECT_TRUE(is_meant(node, {}));
+  EXPECT_TRUE(is_meant(node, {"S1", "usb-1", "A", "/dev/video0"}));
+  EXPECT_TRUE(is_meant(node, {"S1", "1-1", "A", "/dev/video0"}));
+  EXPECT_FALSE(is_meant(node, {"S2", "usb-1", "A", "/dev/video0"}));
+  EXPECT_FALSE(is_meant(node, {"S1", "usb-2", "A", "/dev/video0"}));
+  EXPECT_FALSE(is_meant(node, {"S1", "usb-1", "B", "/dev/video0"}));
+  EXPECT_FALSE(is_meant(node, {"S1", "usb-1", "A", "/dev/video1"}));
+  VideoNode forbidden = node;
+  forbidden.open_error = EACCES;
+  EXPECT_TRUE(is_meant(forbidden, {"S1", "usb-2", "", ""})) << "its bus is not known";
+  EXPECT_FALSE(is_meant(forbidden, {"S2", "usb-2", "", ""}));
+}
+
 TEST(FindCamera, SaysWhichGroupIsMissing) {
   const std::vector<VideoNode> nodes{{"/dev/video0", "A", "", "", "1-1", "S1", false, EACCES}};
   try {
