@@ -170,10 +170,10 @@ void AptController::move_to_counts(double counts, double degrees_per_s, TimePoin
   stopping_ = false;
 }
 
-void AptController::stop(bool at_once, TimePoint now) {
+void AptController::stop(Stop how, TimePoint now) {
   const double f = speed_factor_;
-  follow(at_once ? motion_.freeze(now)
-                 : motion_.stop(acceleration_ * options_.counts_per_degree * f * f, now));
+  follow(how == Stop::at_once ? motion_.freeze(now)
+                              : motion_.stop(acceleration_ * options_.counts_per_degree * f * f, now));
   homing_ = false;
   tell_end_ = true;
   stopping_ = true;
@@ -237,7 +237,7 @@ void AptController::obey(std::span<const std::uint8_t> message) {
       move_to_counts(static_cast<std::int32_t>(little_endian(message, data + 2, 4)), velocity_, now);
       break;
     case 0x0465:
-      if (message[2] == 1) stop(message[3] == 1, now);
+      if (message[2] == 1) stop(message[3] == 1 ? Stop::at_once : Stop::along_the_ramp, now);
       break;
     case 0x0480:
       if (options_.stepper) say_status(0x0481);

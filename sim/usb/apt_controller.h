@@ -62,7 +62,8 @@ class AptController final : public ByteDevice {
   void say_status(std::uint16_t number);
   void say_info();
   void move_to_counts(double counts, double degrees_per_s, TimePoint now);
-  void stop(bool at_once, TimePoint now);
+  enum class Stop { at_once, along_the_ramp };
+  void stop(Stop how, TimePoint now);
   void follow(const Trajectory& counts);
   [[nodiscard]] double counts_at(TimePoint now) const;
   [[nodiscard]] std::uint32_t status_bits(TimePoint now) const;
