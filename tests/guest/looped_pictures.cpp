@@ -1,10 +1,15 @@
 #include "tests/guest/looped_pictures.h"
 
-#include <array>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <optional>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <linux/videodev2.h>
@@ -58,6 +63,88 @@ void set_control(VideoDevice& device, const std::string& name, std::int32_t valu
   must(device, VIDIOC_S_CTRL, &setting, name.c_str());
 }
 
+/// vivid's output, its buffers mapped.
+class Output {
+ public:
+  explicit Output(const std::string& node)
+      : descriptor_(open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)),
+        open_(descriptor_ >= 0 && set_up()) {}
+  Output(const Output&) = delete;
+  Output& operator=(const Output&) = delete;
+  ~Output() {
+    for (const auto& [memory, length] : mapped_) munmap(memory, length);
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  [[nodiscard]] bool is_open() const { return open_; }
+  [[nodiscard]] std::uint32_t buffers() const { return static_cast<std::uint32_t>(mapped_.size()); }
+
+  /// Fills a buffer with `luma`, no colour, and queues it. @return false when the device is lost.
+  bool show(std::uint32_t index, const cv::Mat& luma) {
+    std::uint8_t* bytes = mapped_[index].first;
+    for (int i = 0; i < width * height; ++i) {
+      bytes[2 * i] = luma.data[i];
+      bytes[2 * i + 1] = 128;
+    }
+    v4l2_buffer buffer = described(index);
+    buffer.bytesused = picture_bytes_;
+    buffer.field = V4L2_FIELD_NONE;
+    return call(VIDIOC_QBUF, &buffer);
+  }
+  bool start() {
+    int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    return call(VIDIOC_STREAMON, &type);
+  }
+  /// Waits a while for a buffer that was shown. @return its index; nothing, and errno, when there is none.
+  std::optional<std::uint32_t> wait() {
+    pollfd waits{descriptor_, POLLOUT, 0};
+    errno = EAGAIN;
+    if (poll(&waits, 1, 200) == 0) return std::nullopt;
+    v4l2_buffer buffer = described(0);
+    if (!call(VIDIOC_DQBUF, &buffer)) return std::nullopt;
+    return buffer.index;
+  }
+
+ private:
+  bool call(unsigned long request, void* argument) const {
+    return ioctl(descriptor_, request, argument) == 0;
+  }
+  static v4l2_buffer described(std::uint32_t index) {
+    v4l2_buffer buffer{};
+    buffer.index = index;
+    buffer.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    buffer.memory = V4L2_MEMORY_MMAP;
+    return buffer;
+  }
+  bool set_up() {
+    v4l2_format format{};
+    format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    format.fmt.pix.width = width;
+    format.fmt.pix.height = height;
+    format.fmt.pix.pixelformat = V4L2_PIX_FMT_YUYV;
+    format.fmt.pix.field = V4L2_FIELD_NONE;
+    v4l2_requestbuffers request{};
+    request.count = 3;
+    request.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    request.memory = V4L2_MEMORY_MMAP;
+    if (!call(VIDIOC_S_FMT, &format) || !call(VIDIOC_REQBUFS, &request)) return false;
+    picture_bytes_ = format.fmt.pix.sizeimage;
+    for (std::uint32_t index = 0; index < request.count; ++index) {
+      v4l2_buffer buffer = described(index);
+      if (!call(VIDIOC_QUERYBUF, &buffer)) return false;
+      void* memory =
+          mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor_, buffer.m.offset);
+      if (memory == MAP_FAILED) return false;
+      mapped_.emplace_back(static_cast<std::uint8_t*>(memory), buffer.length);
+    }
+    return true;
+  }
+
+  int descriptor_;
+  std::vector<std::pair<std::uint8_t*, std::size_t>> mapped_;
+  std::uint32_t picture_bytes_ = 0;
+  bool open_;  ///< last: it is set up by then
+};
+
 }  // namespace
 
 LoopedPictures::LoopedPictures(std::function<void(cv::Mat&)> draw)
@@ -85,69 +172,24 @@ void LoopedPictures::feed(const std::stop_token& stop) {
 }
 
 bool LoopedPictures::feed_until_lost(const std::stop_token& stop) {
-  const int descriptor = open(output_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  const auto call = [descriptor](unsigned long request, void* argument) {
-    return ioctl(descriptor, request, argument) == 0;
-  };
-  constexpr std::uint32_t type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-  v4l2_format format{};
-  format.type = type;
-  format.fmt.pix.width = width;
-  format.fmt.pix.height = height;
-  format.fmt.pix.pixelformat = V4L2_PIX_FMT_YUYV;
-  format.fmt.pix.field = V4L2_FIELD_NONE;
-  v4l2_requestbuffers request{};
-  request.count = 3;
-  request.type = type;
-  request.memory = V4L2_MEMORY_MMAP;
-  bool good = call(VIDIOC_S_FMT, &format) && call(VIDIOC_REQBUFS, &request) && request.count <= 8;
-  std::array<std::uint8_t*, 8> memory{};
-  std::size_t length = 0;
-  cv::Mat luma(height, width, CV_8UC1);
+  Output output(output_);
   const auto show = [&](std::uint32_t index) {
-    luma.setTo(16);
+    cv::Mat luma(height, width, CV_8UC1, cv::Scalar(16));
     draw_(luma);
-    for (int i = 0; i < width * height; ++i) {
-      memory[index][2 * i] = luma.data[i];
-      memory[index][2 * i + 1] = 128;
-    }
-    v4l2_buffer buffer{};
-    buffer.index = index;
-    buffer.type = type;
-    buffer.memory = V4L2_MEMORY_MMAP;
-    buffer.bytesused = format.fmt.pix.sizeimage;
-    buffer.field = V4L2_FIELD_NONE;
-    return call(VIDIOC_QBUF, &buffer);
+    return output.show(index, luma);
   };
-  for (std::uint32_t index = 0; good && index < request.count; ++index) {
-    v4l2_buffer buffer{};
-    buffer.index = index;
-    buffer.type = type;
-    buffer.memory = V4L2_MEMORY_MMAP;
-    good = call(VIDIOC_QUERYBUF, &buffer);
-    if (!good) break;
-    length = buffer.length;
-    void* mapped = mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, buffer.m.offset);
-    good = mapped != MAP_FAILED;
-    if (good) memory[index] = static_cast<std::uint8_t*>(mapped);
-    good = good && show(index);
-  }
-  int on = static_cast<int>(type);
-  good = good && call(VIDIOC_STREAMON, &on);
+  bool good = output.is_open();
+  for (std::uint32_t index = 0; good && index < output.buffers(); ++index) good = show(index);
+  good = good && output.start();
   while (good && !stop.stop_requested()) {
-    pollfd waits{descriptor, POLLOUT, 0};
-    if (poll(&waits, 1, 200) == 0) continue;
-    v4l2_buffer buffer{};
-    buffer.type = type;
-    buffer.memory = V4L2_MEMORY_MMAP;
-    good = call(VIDIOC_DQBUF, &buffer) ? show(buffer.index) : errno == EAGAIN;
+    const std::optional<std::uint32_t> shown = output.wait();
+    if (!shown) {
+      good = errno == EAGAIN;
+      continue;
+    }
+    good = show(*shown);
     if (good) ++shown_;
   }
-  for (std::uint8_t* mapped : memory) {
-    if (mapped != nullptr) munmap(mapped, length);
-  }
-  close(descriptor);
   return good;
 }
 
