@@ -105,7 +105,7 @@ MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, cons
     steps.start();
     for (;;) {
       heed(stop, order.device, order.operation);
-      const MotionReading reading = steps.read();
+      MotionReading reading = steps.read();
       const TimePoint now = clock.now();
       if (watch.arrived(reading, now, deadline)) {
         steps.finish();

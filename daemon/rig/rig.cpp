@@ -259,7 +259,7 @@ AxisState Rig::Control::state(const std::string& name) {
   AxisSlot& slot = rig_.slot(name);
   rig_.pulse_.beat(answer_timeout);
   try {
-    const AxisState state = rig_.open(slot).state(rig_.clock_.now() + answer_timeout);
+    AxisState state = rig_.open(slot).state(rig_.clock_.now() + answer_timeout);
     rig_.note(slot, state, std::nullopt);
     return state;
   } catch (const std::exception& error) {

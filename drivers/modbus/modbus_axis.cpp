@@ -139,6 +139,7 @@ ModbusAxis::Reading ModbusAxis::read(const std::string& operation, TimePoint dea
   std::int64_t code = 0;
   if (profile_.alarm_code) {
     std::vector<std::uint16_t> values;
+    values.reserve(2);
     for (int i = 0; i < profile_.alarm_code->bits / 16; ++i)
       values.push_back(registers[static_cast<std::uint16_t>(profile_.alarm_code->address + i)]);
     code = decode(*profile_.alarm_code, profile_.word_order, values);
@@ -227,7 +228,7 @@ void ModbusAxis::set_up_after_connecting(const std::string& operation, TimePoint
 ModbusAxis::Reading ModbusAxis::wait_for_standstill(const std::string& operation, TimePoint deadline) {
   const TimePoint patience = std::min(deadline, clock_.now() + standstill_patience);
   for (;;) {
-    const Reading reading = read(operation, deadline);
+    Reading reading = read(operation, deadline);
     if (!reading.moving) return reading;
     if (clock_.now() >= patience)
       throw DeviceError(options_.name, operation,
@@ -267,7 +268,7 @@ ModbusAxis::Reading ModbusAxis::wait_until_ready(const std::string& operation, T
   const TimePoint patience = std::min(deadline, clock_.now() + options_.patience.start_time);
   bool set_up_again = false;
   for (;;) {
-    const Reading reading = read(operation, deadline);
+    Reading reading = read(operation, deadline);
     if (reading.ready) return reading;
     heed(stop, options_.name, operation);
     if (!set_up_again) {
@@ -295,7 +296,8 @@ MotionReading ModbusAxis::run(MotionOrder::Goal goal, const std::string& operati
     write(operation, command.writes, command.fill, deadline, command.sending);
   };
   steps.read = [&] {
-    MotionReading reading = read(operation, deadline);
+    const Reading all = read(operation, deadline);
+    MotionReading reading = static_cast<const MotionReading&>(all);
     // Of a drive without a homed bit nothing but its standstill says that homing has ended.
     if (goal == MotionOrder::Goal::home && !profile_.homed) reading.homed = true;
     return reading;

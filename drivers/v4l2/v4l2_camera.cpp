@@ -1,6 +1,7 @@
 #include "drivers/v4l2/v4l2_camera.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
 
@@ -80,7 +81,7 @@ double set_rate(VideoDevice& device, double wanted) {
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   auto& interval = parameters.parm.capture.timeperframe;
   interval.numerator = 1000;
-  interval.denominator = static_cast<std::uint32_t>((wanted > 0.0 ? wanted : usual) * 1000.0 + 0.5);
+  interval.denominator = static_cast<std::uint32_t>(std::lround((wanted > 0.0 ? wanted : usual) * 1000.0));
   const int error = device.control(VIDIOC_S_PARM, &parameters);
   if (error == 0 && interval.numerator > 0 && interval.denominator > 0) {
     return static_cast<double>(interval.denominator) / interval.numerator;
