@@ -209,7 +209,8 @@ class InTheHandsOfACommand : public DrivenByHand {
     profile.replace(profile.find(watchdog), watchdog.size(), "watchdog_ms = 0");
     std::ofstream(folder_.path() / "table.toml") << profile;
     std::ofstream(folder_.path() / "dimmer.toml")
-        << "format = 1\nkind = \"lamp\"\nmodel = \"dimmer\"\nword_order = \"high_first\"\nfull = 1000\n[commands]\n"
+        << "format = 1\nkind = \"lamp\"\nmodel = \"dimmer\"\nword_order = \"high_first\"\nfull = "
+           "1000\n[commands]\n"
         << "set_level = [{ register = 0x68, values = [\"level:32\"] }]\n";
     const std::string endpoint = "endpoint = \"tcp://127.0.0.1:" + std::to_string(drives_.port()) + "\"\n";
     std::ofstream(rig_) << "[daemon]\nruntime_dir = \"run\"\nstate_dir = \"state\"\n"
