@@ -47,7 +47,11 @@ void JournalFile::append(std::string_view lines) {
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const int error = n < 0 ? errno : ENOSPC;
-      cut_to(good_bytes_);
+      to_be_cut_ = true;  // by the next call, if it cannot be now: what failed first is reported
+      try {
+        cut_to(good_bytes_);
+      } catch (const FileError&) {
+      }
       throw FileError(file_,
                       "cannot be written: " + write_trouble(error) + "; what was written before is safe");
     }

@@ -20,11 +20,11 @@
 
 namespace eigenpose {
 
-/// The chromaticities of a picture, in 16×16 pixels, row by row. Numbers 0…255.
+/// The chromaticities of a picture, in 16×16 pixels, row by row, 0…255.
 struct ChromaticityMap {
   static constexpr int side = 16;
   static constexpr std::size_t pixels = std::size_t{side} * side;
-  static constexpr std::size_t numbers = 3 * pixels;
+  static constexpr std::size_t bytes = 3 * pixels;
 
   std::array<std::uint8_t, pixels> u{};  ///< red against green
   std::array<std::uint8_t, pixels> v{};  ///< yellow against blue
@@ -33,7 +33,8 @@ struct ChromaticityMap {
   friend bool operator==(const ChromaticityMap&, const ChromaticityMap&) = default;
 };
 
-/// @param picture 8-bit BGR, its sides at least 16 pixels.
+/// @param picture 8-bit BGR, square, of any size: it is brought to 64×64 pixels first, so that a view and a
+/// region of it have the same map whatever size they come in.
 /// @param background root brightness (0…1) of each band that is taken off, as the windows do.
 ChromaticityMap chromaticity_map(const cv::Mat& picture, const std::array<float, 3>& background = {});
 
@@ -43,7 +44,7 @@ using ChromaticityRoots = std::array<float, 64>;
 /// @param visible weight of each pixel, 0…1; empty: all are visible.
 ChromaticityRoots chromaticity_roots(const ChromaticityMap& map, std::span<const float> visible = {});
 
-/// Hellinger distance, 0…1.
+/// Hellinger distance, 0…1; 1 where nothing is bright in either.
 double hellinger_distance(const ChromaticityRoots& a, const ChromaticityRoots& b);
 
 }  // namespace eigenpose

@@ -14,7 +14,7 @@ namespace eigenpose {
 /// Distances below this are measured as this: nothing is nearer than noise.
 inline constexpr double least_distance = 1e-4;
 /// The same for distances of colours.
-inline constexpr double least_color_distance = 0.02;
+inline constexpr double least_color_distance = 0.08;
 
 /// Log-odds linear in what was measured (logistic regression). What each weight multiplies is defined by
 /// `whole_terms`, `windows_terms` and `occluded_terms` of core/recognition/decision.h.

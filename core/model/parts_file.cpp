@@ -128,10 +128,10 @@ Eigen::MatrixXd read_view_poses(const Hdf5Group& group, const AlignmentEigenspac
   return poses;
 }
 
-/// One row of numbers a view.
+/// One row a view: u, v and brightness of each pixel.
 void write_colors(const Hdf5Group& group, const ColorViews& colors) {
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(colors.maps().size() * ChromaticityMap::numbers);
+  bytes.reserve(colors.maps().size() * ChromaticityMap::bytes);
   for (const ChromaticityMap& map : colors.maps())
     for (const auto* plane : {&map.u, &map.v, &map.brightness})
       bytes.insert(bytes.end(), plane->begin(), plane->end());
@@ -139,7 +139,7 @@ void write_colors(const Hdf5Group& group, const ColorViews& colors) {
 }
 
 ColorViews read_colors(const Hdf5Group& group, std::size_t views) {
-  std::vector<std::uint8_t> bytes(views * ChromaticityMap::numbers);
+  std::vector<std::uint8_t> bytes(views * ChromaticityMap::bytes);
   group.read_bytes("colors", bytes);
   std::vector<ChromaticityMap> maps(views);
   auto from = bytes.begin();

@@ -5,6 +5,16 @@
 /// The alignment eigenspace of one object gives the misalignment of the region with respect to the learned
 /// views. With that undone, the region is projected again, and its distance to the manifolds in the universal
 /// eigenspace decides: it separates the learned objects, and known objects from unknown ones, best.
+///
+/// Where pictures have colours, the region's tint is undone with the misalignment: light and white balance
+/// change by a few percent, which is more than new views of a densely sampled object differ by. With g(b, r)
+/// the projection of the region with gains 1 + b of blue and 1 + r of red, m the nearest point of the
+/// object's manifold, T the derivatives of g, s the distance of new views and e the effective dimensions, the
+/// tint is x = (b, r), each held to ±10 %, of
+///
+///     (TᵀT + s²/(e·σ²)·I) x = Tᵀ(m − g(0, 0)),    σ = 0.03.
+///
+/// While s is being measured it counts as 0.
 
 #include <memory>
 #include <optional>
@@ -58,13 +68,21 @@ class AlignedMatch {
   [[nodiscard]] const Eigen::VectorXf& point() const { return point_; }
 
  private:
+  /// Projects the realigned picture as it is, and where it has colours with a step of each gain.
+  void project();
+  /// Moves the point to what the region would be without its tint beside `object`.
+  void undo_tint(std::size_t object);
+
   const Model& model_;
   const ModelSearches& searches_;
   double reach_;
   PoseAligner aligner_;
   AppearanceMaker maker_;
   std::vector<float> realigned_;  ///< picture
-  Eigen::VectorXf appearance_;
+  std::vector<float> tinted_;     ///< the same with one gain moved
+  Eigen::MatrixXf appearances_;   ///< of the picture; where it has colours, with a step of blue and of red
+  Eigen::MatrixXf points_;        ///< of the appearances
+  Eigen::VectorXd nearest_;       ///< point of the manifold
   Eigen::VectorXf point_;
 };
 

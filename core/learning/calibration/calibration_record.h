@@ -7,7 +7,7 @@
 /// common, and the eigenspaces: how a view is misaligned and what its own object's windows vote (little), and
 /// what the view was taken for (where an object that joins or left is like it). The first are kept as they
 /// are. Of the second, views near an object that joined, or that were compared with one that left, are shown
-/// again (probes.h). After many changes nothing is kept: `fresh_enough`.
+/// again (probes.h). After many changes nothing is kept: `carry_over`.
 
 #include <array>
 #include <cstddef>

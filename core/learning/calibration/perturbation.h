@@ -14,7 +14,7 @@
 namespace eigenpose {
 
 /// White balance and the light's colour are held this well.
-inline constexpr double usual_tint = 0.03;
+inline constexpr double usual_tint = 0.01;
 
 /// How far a picture is displaced at random. Each unknown is uniform between minus and plus its bound.
 struct Perturbation {

@@ -99,7 +99,9 @@ TEST_F(JournalFileTest, HalfALineThatCouldNotBeCutOffIsCutOffBeforeTheNext) {
   journal.append("one\n");
   disk.room = 9;
   disk.cut_fails = true;
-  EXPECT_THROW(journal.append("a very long line\n"), FileError);
+  EXPECT_THAT([&] { journal.append("a very long line\n"); },
+              ThrowsMessage<FileError>(HasSubstr("cannot be written: ")))
+      << "what failed first is reported";
   EXPECT_EQ(text(), "one\na very lo");
   disk.room = 100;
   EXPECT_THROW(journal.append("2\n"), FileError) << "it still cannot be";

@@ -54,6 +54,20 @@ TEST(ChromaticityMap, IsOfThePictureInSixteenPixelsASide) {
     EXPECT_EQ(map.brightness[i], i == 2 * 16 + 1 ? 200 : 0) << i;
 }
 
+TEST(ChromaticityMap, IsTheSameOfAPictureAndOfItsCopyInTheSizeOfWindows) {
+  for (const int side : {8, 48, 100}) {
+    cv::Mat picture(side, side, CV_8UC3);
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x)
+        picture.at<cv::Vec3b>(y, x) =
+            cv::Vec3b(static_cast<std::uint8_t>(255 * x / side), static_cast<std::uint8_t>(255 * y / side),
+                      static_cast<std::uint8_t>(255 * (x ^ y) / (2 * side)));
+    cv::Mat copy;
+    cv::resize(picture, copy, {64, 64}, 0.0, 0.0, cv::INTER_AREA);
+    EXPECT_EQ(chromaticity_map(picture), chromaticity_map(copy)) << side;
+  }
+}
+
 TEST(ChromaticityMap, TakesTheBackgroundOff) {
   const std::array<float, 3> background{std::sqrt(40.0F / 255.0F), std::sqrt(20.0F / 255.0F), 0.0F};
   EXPECT_EQ(chromaticity_map(plain({140, 120, 100}), background), chromaticity_map(plain({100, 100, 100})));
@@ -93,6 +107,11 @@ TEST(ChromaticityRoots, OfAPartAreThoseOfThatPartAlone) {
 TEST(HellingerDistance, IsZeroForTheSameAndOneForNothingInCommon) {
   EXPECT_EQ(distance(plain({10, 60, 200}), plain({10, 60, 200})), 0.0);
   EXPECT_NEAR(distance(plain({0, 0, 200}), plain({200, 0, 0})), 1.0, 1e-6);
+}
+
+TEST(HellingerDistance, IsOneWhereNothingIsBright) {
+  EXPECT_EQ(distance(plain({0, 0, 0}), plain({0, 0, 200})), 1.0);
+  EXPECT_EQ(distance(plain({0, 0, 0}), plain({0, 0, 0})), 1.0) << "black says nothing of an object";
 }
 
 TEST(HellingerDistance, IsTheOneOfTheFrequencies) {

@@ -107,5 +107,53 @@ TEST(AlignedMatch, IsNearerOnceTheMisalignmentIsUndone) {
   EXPECT_NEAR(std::remainder(pose.q[0] - 140.0, 360.0), 0.0, 3.0);
 }
 
+/// The same with the gains of blue and of red.
+std::vector<float> tinted(std::vector<float> picture, float blue, float red) {
+  for (std::size_t i = 0; i < picture.size(); i += 3) {
+    picture[i] *= blue;
+    picture[i + 2] *= red;
+  }
+  return picture;
+}
+
+/// To the object's manifold, with nothing undone.
+double plain_distance(const Model& model, const ModelSearches& searches, const std::vector<float>& picture,
+                      std::size_t object) {
+  AppearanceMaker maker(model.normalization);
+  Eigen::VectorXf appearance(model.eigenspace.length());
+  const float energy = maker.make(picture, {appearance.data(), static_cast<std::size_t>(appearance.size())});
+  const Eigen::VectorXf point =
+      model.eigenspace.basis.transpose() * appearance / energy - searches.mean_point;
+  return searches.separate[object].nearest(point)[0].distance;
+}
+
+TEST(AlignedMatch, UndoesATintAndNoMore) {
+  const auto& world = testing::parts_world();
+  const ModelSearches searches(*world.model);
+  AlignedMatch match(*world.model, searches, everywhere);
+  for (const auto& [kind, name] : {std::pair{1, "one"}, std::pair{2, "two"}}) {
+    const std::size_t own = world.index_of(name);
+    const auto picture = picture_of(*world.model, kind, 77.0);
+    const double plain = match.distance(picture, {}, {own}).own;
+    const auto slightly = tinted(picture, 0.95F, 1.06F);
+    const double added = plain_distance(*world.model, searches, slightly, own) - plain;
+    EXPECT_GT(added, 0.01) << name;
+    EXPECT_LT(match.distance(slightly, {}, {own}).own, plain + 0.2 * added) << name;
+    EXPECT_GT(match.distance(tinted(picture, 0.6F, 1.4F), {}, {own}).own, 3.0 * plain) << name;
+  }
+}
+
+TEST(AlignedMatch, UndoesTheTintBesideTheObjectItIsComparedWith) {
+  // Whatever it was compared with before.
+  const auto& world = testing::parts_world();
+  const ModelSearches searches(*world.model);
+  AlignedMatch match(*world.model, searches, everywhere);
+  const auto picture = tinted(picture_of(*world.model, 1, 77.0), 1.05F, 0.95F);
+  const std::size_t own = world.index_of("one");
+  const double alone = match.distance(picture, {}, {own}).own;
+  (void)match.distance(picture, {}, {world.index_of("two")});
+  EXPECT_EQ(match.distance(picture, {}, {own}).own, alone);
+}
+
 }  // namespace
 }  // namespace eigenpose

@@ -30,25 +30,25 @@ TEST(Decision, EvidenceIsTheSumOfWeightedTerms) {
                   8.0 * 0.2 + 9.0 * 0.05,
               1e-12);
   // Colours, where views have some.
-  const ColorMatch color{0.1, 0.05};
+  const ColorMatch color{0.2, 0.15};
   WholeMatch colored = whole;
   colored.color = color;
   EXPECT_NEAR(evidence_of(weights, colored) - evidence_of(weights, whole),
-              4.0 * std::log(0.1) + 5.0 * std::log(0.05), 1e-12);
+              4.0 * std::log(0.2) + 5.0 * std::log(0.15), 1e-12);
   EXPECT_NEAR(evidence_of(weights, colored, windows) - evidence_of(weights, whole, windows),
-              9.0 * std::log(0.1) + 10.0 * std::log(0.05), 1e-12);
+              9.0 * std::log(0.2) + 10.0 * std::log(0.15), 1e-12);
   OccludedMatch colored_part = occluded;
   colored_part.color = color;
   EXPECT_NEAR(evidence_of(weights, colored_part) - evidence_of(weights, occluded),
-              10.0 * std::log(0.1) + 11.0 * std::log(0.05), 1e-12);
+              10.0 * std::log(0.2) + 11.0 * std::log(0.15), 1e-12);
 }
 
 TEST(Decision, ColoursNearerThanNoiseAreAllTheSame) {
   const auto terms = [](double h) {
     return whole_terms({.distance = 0.1, .typical = 0.1, .color = ColorMatch{h, h}});
   };
-  EXPECT_EQ(terms(0.0), terms(0.02));
-  EXPECT_NE(terms(0.02), terms(0.03));
+  EXPECT_EQ(terms(0.0), terms(0.08));
+  EXPECT_NE(terms(0.08), terms(0.09));
 }
 
 TEST(Decision, TermsStayFiniteAtTheEdgesOfWhatIsMeasured) {

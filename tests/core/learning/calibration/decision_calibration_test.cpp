@@ -73,7 +73,7 @@ TEST(DecisionCalibration, ColoursTellKnownFromUnknownWhereDistancesDoNot) {
   auto probes = drawn(20, 40, 0.5);
   SeededRandom random(5);
   for (Probe& probe : probes)
-    probe.whole.color = ColorMatch{(probe.known ? 0.05 : 0.3) * std::exp(0.4 * random.symmetric()), 0.05};
+    probe.whole.color = ColorMatch{(probe.known ? 0.12 : 0.66) * std::exp(0.4 * random.symmetric()), 0.12};
   const DecisionModel decision = calibrate_decision(probes, {0.01, 0.01});
   EXPECT_LE(decision.expected.false_rejection, 0.01);
   EXPECT_LE(decision.expected.false_acceptance, 0.01);
