@@ -59,7 +59,7 @@ AlignedMatch::AlignedMatch(const Model& model, const ModelSearches& searches, do
       nearest_(model.eigenspace.components()),
       point_(model.eigenspace.components()) {}
 
-void AlignedMatch::project() {
+void AlignedMatch::project(Eigen::Index columns) {
   const auto make = [this](std::span<const float> picture, Eigen::Index column) {
     const std::span<float> appearance(appearances_.col(column).data(),
                                       static_cast<std::size_t>(appearances_.rows()));
@@ -68,13 +68,13 @@ void AlignedMatch::project() {
     return appearances_.col(column).norm();
   };
   std::array<float, 3> energies{make(realigned_, 0)};
-  for (Eigen::Index column = 1; column < appearances_.cols(); ++column) {
+  for (Eigen::Index column = 1; column < columns; ++column) {
     tinted_ = realigned_;
     for (std::size_t i = column == 1 ? blue : red; i < tinted_.size(); i += 3) tinted_[i] *= 1.0F + tint_step;
     energies[static_cast<std::size_t>(column)] = make(tinted_, column);
   }
-  project_onto(model_.eigenspace.basis, appearances_, appearances_.cols(), points_);
-  for (Eigen::Index column = 0; column < points_.cols(); ++column)
+  project_onto(model_.eigenspace.basis, appearances_, columns, points_);
+  for (Eigen::Index column = 0; column < columns; ++column)
     points_.col(column) /= std::max(energies[static_cast<std::size_t>(column)], 1e-9F);
   point_ = points_.col(0) - searches_.mean_point;
 }
@@ -94,18 +94,19 @@ void AlignedMatch::undo_tint(std::size_t object) {
       least_slope * least_slope + static_cast<float>(variance / (expected_tint * expected_tint));
   const float determinant = normal(0, 0) * normal(1, 1) - normal(0, 1) * normal(1, 0);
   const Eigen::Vector2f pull = slopes.transpose().lazyProduct(nearest_.cast<float>() - point_);
-  Eigen::Vector2f tint((normal(1, 1) * pull[0] - normal(0, 1) * pull[1]) / determinant,
-                       (normal(0, 0) * pull[1] - normal(1, 0) * pull[0]) / determinant);
-  tint = tint.cwiseMax(-most_tint).cwiseMin(most_tint);
-  point_ += slopes.col(0) * tint[0] + slopes.col(1) * tint[1];
+  Eigen::Vector2f gains((normal(1, 1) * pull[0] - normal(0, 1) * pull[1]) / determinant,
+                        (normal(0, 0) * pull[1] - normal(1, 0) * pull[0]) / determinant);
+  gains = gains.cwiseMax(-most_tint).cwiseMin(most_tint);
+  point_ += slopes.col(0) * gains[0] + slopes.col(1) * gains[1];
 }
 
 RealignedDistance AlignedMatch::distance(std::span<const float> picture, const Misalignment& misalignment,
-                                         const ComparedObject& object) {
+                                         const ComparedObject& object, Tint tint) {
   (void)undo_misalignment(picture, model_.normalization.size, picture_bands(model_.normalization),
                           misalignment, realigned_);
-  project();
-  if (points_.cols() == 3) undo_tint(object.object);
+  const Eigen::Index columns = tint == Tint::undone ? appearances_.cols() : 1;
+  project(columns);
+  if (columns == 3) undo_tint(object.object);
   return distance_to(point_, searches_, object, reach_);
 }
 

@@ -48,6 +48,9 @@ struct ComparedObject {
 RealignedDistance distance_to(const Eigen::Ref<const Eigen::VectorXf>& point, const ModelSearches& searches,
                               const ComparedObject& object, double reach);
 
+/// What becomes of a region's tint. Undoing it costs two more projections.
+enum class Tint { kept, undone };
+
 /// Aligns one region after the other. Holds scratch memory: one thread at a time.
 class AlignedMatch {
  public:
@@ -62,14 +65,14 @@ class AlignedMatch {
 
   /// @param picture as the normaliser makes it. @param misalignment of `object` in it.
   RealignedDistance distance(std::span<const float> picture, const Misalignment& misalignment,
-                             const ComparedObject& object);
+                             const ComparedObject& object, Tint tint = Tint::undone);
 
   /// The realigned region in the universal eigenspace, as `distance` saw it last.
   [[nodiscard]] const Eigen::VectorXf& point() const { return point_; }
 
  private:
-  /// Projects the realigned picture as it is, and where it has colours with a step of each gain.
-  void project();
+  /// Projects the realigned picture as it is, and with 3 columns with a step of each gain too.
+  void project(Eigen::Index columns);
   /// Moves the point to what the region would be without its tint beside `object`.
   void undo_tint(std::size_t object);
 

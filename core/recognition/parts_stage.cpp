@@ -16,9 +16,9 @@ constexpr double reach_of_others = 0.5;
 
 /// An object in the pose that fits best, compared with the whole region.
 WholeCandidate candidate_at(const AlignedPose& pose, const PartsRecognizer::Look& look, AlignedMatch& match,
-                            const WholeRegion& region, std::size_t object) {
+                            const WholeRegion& region, std::size_t object, Tint tint = Tint::undone) {
   WholeCandidate candidate{object, pose.q, pose.misalignment, {}, look.color_match(object), {}, 0.0};
-  candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent});
+  candidate.distance = match.distance(region.picture, candidate.misalignment, {object, region.absent}, tint);
   return candidate;
 }
 
@@ -102,8 +102,14 @@ std::size_t PartsStage::judge(std::span<const float> picture, std::size_t neares
   quantize(picture, {picture_.ptr<std::uint8_t>(), picture.size()});
   const PartsRecognizer::Look look = recognizer_.look(picture_);
   const std::vector<AlignedPose>& aligned = match_.align(look.pose_picture(), nearest);
-  const WholeCandidate candidate = candidate_at(aligned.front(), look, match_, {picture, {}}, nearest);
-  return settle(look, aligned, candidate, outcome) ? nearest : vote(look, picture, candidate, outcome);
+  // A tint that is undone brings the region nearer: where it is near enough as it is, that settles it.
+  WholeCandidate candidate = candidate_at(aligned.front(), look, match_, {picture, {}}, nearest, Tint::kept);
+  const bool near_enough =
+      evidence_of(model_.decision.weights, whole_match(model_, candidate)) >= model_.decision.settled;
+  if (near_enough && settle(look, aligned, candidate, outcome)) return nearest;
+  candidate.distance = match_.distance(picture, candidate.misalignment, {nearest});
+  if (!near_enough && settle(look, aligned, candidate, outcome)) return nearest;
+  return vote(look, picture, candidate, outcome);
 }
 
 bool PartsStage::settle(const PartsRecognizer::Look& look, std::span<const AlignedPose> aligned,
