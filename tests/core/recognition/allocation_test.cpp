@@ -1,76 +1,15 @@
 /// The path from frame to outcome takes no memory once it is warm.
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include <gtest/gtest.h>
 
 #include "core/recognition/recognizer.h"
+#include "tests/support/counted_memory.h"
 #include "tests/support/learned_world.h"
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-void* counted(std::size_t size) {
-  ++allocations;
-  void* memory = std::malloc(size == 0 ? 1 : size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-void* counted(std::size_t size, std::align_val_t alignment) {
-  ++allocations;
-  void* memory = nullptr;
-  if (posix_memalign(&memory, std::max<std::size_t>(sizeof(void*), static_cast<std::size_t>(alignment)),
-                     size) != 0)
-    throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return counted(size);
-}
-void* operator new[](std::size_t size) {
-  return counted(size);
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return counted(size, alignment);
-}
-void* operator new[](std::size_t size, std::align_val_t alignment) {
-  return counted(size, alignment);
-}
-// Not inlined: g++ would see free() of what operator new gave, and take the pair for a mistake.
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete[](void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace eigenpose {
 namespace {
+
+using testing::allocations;
 
 /// Counts what OpenCV takes for pictures; it goes past operator new.
 class CountingAllocator final : public cv::MatAllocator {
@@ -119,6 +58,7 @@ void expect_no_memory_taken(Recognizer& recognizer, const std::vector<cv::Mat>& 
   const std::size_t third = pass();
   const long taken = allocations - before;
   cv::Mat::setDefaultAllocator(cv::Mat::getStdAllocator());
+  EXPECT_GT(before, 0) << "memory is counted";
   EXPECT_EQ(taken, 0);
   EXPECT_EQ(first, third);
   EXPECT_GT(third, frames.size());
