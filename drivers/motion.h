@@ -134,7 +134,7 @@ struct MotionSteps {
 
 /// Starts the motion and waits until it has arrived. @return the last reading.
 /// @throws what MotionWatch throws and the device errors of `steps`; Interrupted when `stop` was requested,
-/// also in the place of a failure that the stop has brought about; DeviceError for any other exception of
+/// also instead of a failure that the stop has caused; DeviceError for any other exception of
 /// `steps`. Each has the words of `halt` behind its cause.
 MotionReading carry_out(const MotionOrder& order, const MotionSteps& steps, const Clock& clock,
                         TimePoint deadline, const std::stop_token& stop);

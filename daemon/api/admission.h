@@ -36,7 +36,7 @@ struct Admission {
 /// user with a full share gives up a connection of its own that is idle. Whoever is busy is never disturbed.
 Admission admit(std::span<const Place> places, std::size_t most, uid_t user);
 
-/// What decides in the place of `admit`.
+/// A function that decides as `admit` does.
 using AdmissionPolicy = std::function<Admission(std::span<const Place>, std::size_t most, uid_t user)>;
 
 }  // namespace eigenpose

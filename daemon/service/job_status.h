@@ -37,7 +37,7 @@ struct AcquisitionResult {
 struct LeftOutDetail {
   std::string object;
   bool whole_object = true;  ///< it is not in the model; else only some of its views are not
-  std::size_t views = 0;     ///< so many could not be used; 0 where none was looked at
+  std::size_t views = 0;     ///< that could not be used; 0 where none was looked at
   std::string reason;        ///< what is wrong with the object, or with the first of the views
 };
 

@@ -150,7 +150,7 @@ struct RegisterRange {
   [[nodiscard]] bool contains(std::int64_t number) const { return least <= number && number <= most; }
 };
 
-/// Of a number of so many bits, 16 or 32.
+/// Of a register value of 16 or 32 bits.
 RegisterRange signed_range(int bits);
 RegisterRange unsigned_range(int bits);
 

@@ -225,7 +225,7 @@ TEST(ModbusRegisters, ANumberThatDoesNotFitIsNotCutOff) {
                std::out_of_range);
 }
 
-/// Whether `number` can be written to a value of so many bits.
+/// Whether a register value of that many bits can hold `number`.
 bool fits(RegisterMeaning meaning, int bits, std::int64_t number, bool position_is_signed = true) {
   RegisterFill fill;
   fill.position_is_signed = position_is_signed;
